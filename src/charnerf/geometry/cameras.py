@@ -1,0 +1,191 @@
+"""Cameras: where they stand, how points project, and which rays their pixels see.
+
+Camera frame: +X right, +Y up, looks along -Z. Pixels: x right, y down, centres at +0.5. Azimuth 0 sees the character's
+front (it faces -Y), 90 its left side, 180 its back; elevation 0 is level.
+"""
+
+import math
+
+import torch
+from torch import Tensor
+
+from charnerf.checks import check_last_dim
+from charnerf.geometry.safe import safe_normalize
+from charnerf.types import Cameras, RayBundle
+
+
+def fibonacci_hemisphere(num_points: int) -> Tensor:
+    """Spread points evenly over the upper hemisphere.
+
+    Args:
+        num_points: How many, at least 1.
+
+    Returns:
+        Unit vectors, (num_points, 3), float64, z >= 0: the golden-angle spiral with equal steps in z.
+
+    Raises:
+        ValueError: If num_points is below 1.
+
+    Source: paper, Dataset Collection (Fibonacci lattice, upper hemisphere).
+    """
+    if num_points < 1:
+        raise ValueError(f"num_points: found {num_points}, expected at least 1.")
+    index = torch.arange(num_points, dtype=torch.float64)
+    z = 1.0 - (index + 0.5) / num_points
+    radius = torch.sqrt((1.0 - z * z).clamp_min(0.0))
+    angle = index * (math.pi * (3.0 - math.sqrt(5.0)))
+    return torch.stack((radius * torch.cos(angle), radius * torch.sin(angle), z), dim=-1)
+
+
+def direction_from_angles(azimuth_deg: Tensor, elevation_deg: Tensor) -> Tensor:
+    """Unit vectors (..., 3) from the character to a camera at the given angles (...), degrees."""
+    azimuth, elevation = torch.deg2rad(azimuth_deg), torch.deg2rad(elevation_deg)
+    level = torch.cos(elevation)
+    return torch.stack((level * torch.sin(azimuth), -level * torch.cos(azimuth), torch.sin(elevation)), dim=-1)
+
+
+def angles_from_direction(directions: Tensor) -> tuple[Tensor, Tensor]:
+    """Azimuth in [0, 360) and elevation in [-90, 90], degrees (...), of vectors (..., 3) towards a camera."""
+    x, y, z = directions.unbind(-1)
+    azimuth = torch.rad2deg(torch.atan2(x, -y)) % 360.0
+    elevation = torch.rad2deg(torch.atan2(z, torch.hypot(x, y)))
+    return azimuth, elevation
+
+
+def look_at(positions: Tensor, targets: Tensor) -> Tensor:
+    """Poses of cameras that look at a target with world +Z up (+Y where they look straight up or down).
+
+    Args:
+        positions: Camera centres, (..., 3), m.
+        targets: Points looked at, (..., 3), m, broadcast to positions.
+
+    Returns:
+        world_from_camera, (..., 4, 4).
+    """
+    backward = safe_normalize(positions - targets)
+    up = torch.zeros_like(backward)
+    up[..., 2] = 1.0
+    vertical = backward[..., 2].abs() > 1.0 - 1e-9
+    up[vertical] = up.new_tensor((0.0, 1.0, 0.0))
+    right = safe_normalize(torch.linalg.cross(up, backward))
+    true_up = torch.linalg.cross(backward, right)
+    pose = torch.zeros(*backward.shape[:-1], 4, 4, dtype=backward.dtype, device=backward.device)
+    pose[..., :3, 0], pose[..., :3, 1], pose[..., :3, 2] = right, true_up, backward
+    pose[..., :3, 3] = positions
+    pose[..., 3, 3] = 1.0
+    return pose
+
+
+def cameras_towards(
+    directions: Tensor, *, target: Tensor, distance: float, half_extent: float, size: int, orthographic: bool
+) -> Cameras:
+    """Square cameras around a target that frame a sphere of a given radius exactly.
+
+    Args:
+        directions: Unit vectors from the target to the cameras, (..., 3).
+        target: Point looked at, (3,), m.
+        distance: From target to camera, m; above half_extent.
+        half_extent: Radius of the sphere that touches the picture's edges, m.
+        size: Image side, pixels.
+        orthographic: Parallel projection instead of a pinhole.
+
+    Returns:
+        Cameras of shape (...).
+
+    Raises:
+        ValueError: If the distance does not exceed the half extent.
+    """
+    if not distance > half_extent > 0.0:
+        raise ValueError(f"distance: found {distance} m, expected more than half_extent = {half_extent} m > 0.")
+    pose = look_at(target + distance * directions, target.expand_as(directions))
+    if orthographic:
+        focal = size / (2.0 * half_extent)
+    else:
+        focal = 0.5 * size * math.sqrt(distance**2 - half_extent**2) / half_extent
+    shape = directions.shape[:-1]
+    return Cameras(
+        world_from_camera=pose,
+        focal=torch.full((*shape, 2), focal, dtype=pose.dtype, device=pose.device),
+        principal_point=torch.full((*shape, 2), 0.5 * size, dtype=pose.dtype, device=pose.device),
+        orthographic=torch.full(shape, orthographic, dtype=torch.bool, device=pose.device),
+        width=size,
+        height=size,
+    )
+
+
+def mirror_cameras(cameras: Cameras) -> Cameras:
+    """Cameras whose pictures are the left-right mirrored pictures of a character mirrored in the plane x = 0.
+
+    A picture flipped left to right is what the mirrored camera sees of the mirrored character; for a character that is its own
+    mirror image, the side drawing flipped is therefore its other side.
+    """
+    world_flip = cameras.world_from_camera.new_tensor((-1.0, 1.0, 1.0, 1.0))
+    pose = world_flip[:, None] * cameras.world_from_camera * world_flip
+    principal = cameras.principal_point.clone()
+    principal[..., 0] = cameras.width - principal[..., 0]
+    return Cameras(
+        world_from_camera=pose,
+        focal=cameras.focal,
+        principal_point=principal,
+        orthographic=cameras.orthographic,
+        width=cameras.width,
+        height=cameras.height,
+    )
+
+
+def to_camera_frame(cameras: Cameras, points: Tensor) -> Tensor:
+    """World points (..., 3) in the frames of cameras whose shape broadcasts against (...)."""
+    rotation = cameras.world_from_camera[..., :3, :3]
+    offset = points - cameras.world_from_camera[..., :3, 3]
+    return (rotation * offset[..., :, None]).sum(-2)  # rotation transposed times offset
+
+
+def project(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Project world points into cameras.
+
+    Args:
+        cameras: Cameras whose shape broadcasts against the points' leading shape.
+        points: (..., 3), m.
+
+    Returns:
+        pixels (..., 2); depth (...), m along the viewing axis, positive in front; in_front (...), bool. Pixels of points on or
+        behind a pinhole's plane are finite and meaningless: mask them with in_front.
+    """
+    check_last_dim("points", points, 3)
+    local = to_camera_frame(cameras, points)
+    depth = -local[..., 2]
+    in_front = depth > 1e-6
+    divisor = torch.where(cameras.orthographic, torch.ones_like(depth), torch.where(in_front, depth, 1.0))
+    flat = torch.stack((local[..., 0], -local[..., 1]), dim=-1) / divisor[..., None]
+    return cameras.principal_point + cameras.focal * flat, depth, in_front
+
+
+def pixel_rays(cameras: Cameras, pixels: Tensor) -> RayBundle:
+    """Rays through pixel positions.
+
+    Args:
+        cameras: Cameras whose shape broadcasts against the pixels' leading shape.
+        pixels: (..., 2), x right, y down; add 0.5 to indices for centres.
+
+    Returns:
+        Rays (...): of a pinhole from its centre, of an orthographic camera from its plane.
+    """
+    check_last_dim("pixels", pixels, 2)
+    flat = (pixels - cameras.principal_point) / cameras.focal
+    x, y = flat[..., 0], -flat[..., 1]
+    zero, one = torch.zeros_like(x), torch.ones_like(x)
+    parallel = cameras.orthographic
+    local_direction = torch.stack((torch.where(parallel, zero, x), torch.where(parallel, zero, y), -one), dim=-1)
+    local_origin = torch.stack((torch.where(parallel, x, zero), torch.where(parallel, y, zero), zero), dim=-1)
+    rotation = cameras.world_from_camera[..., :3, :3]
+    directions = safe_normalize((rotation * local_direction[..., None, :]).sum(-1))
+    origins = cameras.world_from_camera[..., :3, 3] + (rotation * local_origin[..., None, :]).sum(-1)
+    return RayBundle(origins=origins, directions=directions)
+
+
+def pixel_centres(width: int, height: int, *, device: torch.device | str = "cpu") -> Tensor:
+    """Centres of all pixels of an image, (height, width, 2), float32, x then y."""
+    y, x = torch.meshgrid(
+        torch.arange(height, device=device) + 0.5, torch.arange(width, device=device) + 0.5, indexing="ij"
+    )
+    return torch.stack((x, y), dim=-1)
