@@ -189,3 +189,31 @@ def pixel_centres(width: int, height: int, *, device: torch.device | str = "cpu"
         torch.arange(height, device=device) + 0.5, torch.arange(width, device=device) + 0.5, indexing="ij"
     )
     return torch.stack((x, y), dim=-1)
+
+
+def project_into_all(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Project every point into every camera with one matrix product.
+
+    Args:
+        cameras: Cameras (V,).
+        points: (P, 3), m.
+
+    Returns:
+        pixels (P, V, 2), depth (P, V) and in_front (P, V), as `project`.
+    """
+    rotation = cameras.world_from_camera[:, :3, :3]  # (V, 3 world, 3 camera)
+    offset = (rotation * cameras.world_from_camera[:, :3, 3:]).sum(1)  # (V, 3): camera centre in its own axes
+    num_views = rotation.shape[0]
+    local = (points @ rotation.permute(1, 0, 2).reshape(3, num_views * 3)).unflatten(-1, (num_views, 3)) - offset
+    depth = -local[..., 2]
+    in_front = depth > 1e-6
+    divisor = torch.where(cameras.orthographic, torch.ones_like(depth), torch.where(in_front, depth, 1.0))
+    flat = torch.stack((local[..., 0], -local[..., 1]), dim=-1) / divisor[..., None]
+    return cameras.principal_point + cameras.focal * flat, depth, in_front
+
+
+def directions_to_points(cameras: Cameras, points: Tensor) -> Tensor:
+    """Unit directions (P, V, 3) from cameras (V,) to points (P, 3): of an orthographic camera its viewing axis."""
+    along_axis = -cameras.world_from_camera[:, :3, 2]
+    towards = safe_normalize(points[:, None] - cameras.world_from_camera[:, :3, 3])
+    return torch.where(cameras.orthographic[:, None], along_axis, towards)
