@@ -1,0 +1,221 @@
+"""Error of pictures and surfaces against the truth: pure functions, no state.
+
+Pictures are sRGB-encoded in [0, 1], composited on white, (H, W, 3); opacities are (H, W). Surfaces are
+point sets (N, 3), m. A picture of bytes is refused, NaN is refused: a metric of either would be a number
+that means nothing.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+from torchmetrics.functional.image import structural_similarity_index_measure
+
+from charnerf.checks import check_finite, check_last_dim, check_same_shape
+from charnerf.errors import DataError, ShapeError
+
+FOREGROUND_ALPHA = 0.5
+"""True alpha above which a pixel counts as the character."""
+F_SCORE_RADIUS_M = 0.02
+"""Distance within which a surface point counts as found."""
+MIN_SQUARED_ERROR = 1e-10
+"""Mean squared errors below this count as this: equal pictures have 100 dB, so that means stay finite."""
+
+_LPIPS_WEIGHTS = "vgg16-397923af.pth"
+
+
+def check_unit_range(name: str, picture: Tensor) -> None:
+    """Check that a picture holds finite numbers in [0, 1], up to rounding.
+
+    Raises:
+        NumericalError: If it holds NaN or infinity.
+        DataError: If a value lies outside.
+    """
+    check_finite(name, picture)
+    if not picture.numel():
+        raise ShapeError(f"{name}: found an empty picture of shape {tuple(picture.shape)}, expected pixels.")
+    low, high = (float(value) for value in torch.aminmax(picture))
+    if low < -1e-4 or high > 1.0 + 1e-4:
+        hint = "; divide bytes by 255" if high > 2.0 else ""
+        raise DataError(f"{name}: found values from {low:g} to {high:g}, expected the range [0, 1]{hint}.")
+
+
+def _check_pair(prediction: Tensor, truth: Tensor) -> None:
+    check_last_dim("prediction", prediction, 3)
+    check_same_shape("prediction", prediction, "truth", truth)
+    check_unit_range("prediction", prediction)
+    check_unit_range("truth", truth)
+
+
+def _decibels(squared_errors: Tensor) -> float:
+    return float(-10.0 * torch.log10(squared_errors.mean().clamp_min(MIN_SQUARED_ERROR)))
+
+
+def psnr(prediction: Tensor, truth: Tensor) -> float:
+    """Peak signal-to-noise ratio of a whole picture, (H, W, 3) each; dB, at most 100.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+    """
+    _check_pair(prediction, truth)
+    return _decibels((prediction.double() - truth.double()).square())
+
+
+def psnr_foreground(prediction: Tensor, truth: Tensor, true_alpha: Tensor) -> float | None:
+    """Peak signal-to-noise ratio over pixels of true alpha (H, W) above 0.5; None where there is none.
+
+    A white background flatters the whole picture's figure; this one it does not touch.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+    """
+    _check_pair(prediction, truth)
+    check_unit_range("true_alpha", true_alpha)
+    inside = true_alpha > FOREGROUND_ALPHA
+    check_same_shape("true_alpha", true_alpha, "truth[..., 0]", truth[..., 0])
+    if not bool(inside.any()):
+        return None
+    return _decibels((prediction[inside].double() - truth[inside].double()).square())
+
+
+def ssim(prediction: Tensor, truth: Tensor) -> float:
+    """Structural similarity, Gaussian window of 11 pixels with sigma 1.5, mean over pixels and colours.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+
+    Source: Wang 2004; torchmetrics.
+    """
+    _check_pair(prediction, truth)
+    pictures = [picture.float().movedim(-1, 0)[None].contiguous() for picture in (prediction, truth)]
+    value = structural_similarity_index_measure(pictures[0], pictures[1], data_range=1.0)
+    assert isinstance(value, Tensor)
+    return float(value)
+
+
+def flip(prediction: Tensor, truth: Tensor) -> float:
+    """Mean FLIP error of a picture, 0 (equal) to 1, at the evaluator's default of 67 pixels per degree.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+
+    Source: Andersson 2020; flip-evaluator.
+    """
+    from flip_evaluator import evaluate
+
+    _check_pair(prediction, truth)
+    test, reference = (
+        np.ascontiguousarray(picture.detach().clamp(0.0, 1.0).cpu().numpy(), dtype=np.float32)
+        for picture in (prediction, truth)
+    )
+    return float(evaluate(reference, test, "LDR", applyMagma=False)[1])
+
+
+def silhouette_iou(opacity: Tensor, true_alpha: Tensor) -> float:
+    """Intersection over union of the silhouettes (H, W), each where it is above 0.5; 1 where both are empty.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+    """
+    check_same_shape("opacity", opacity, "true_alpha", true_alpha)
+    check_unit_range("opacity", opacity)
+    check_unit_range("true_alpha", true_alpha)
+    found, true = opacity > FOREGROUND_ALPHA, true_alpha > FOREGROUND_ALPHA
+    union = int((found | true).sum())
+    return int((found & true).sum()) / union if union else 1.0
+
+
+@cache
+def lpips_network() -> tuple[Callable[[Tensor, Tensor], Tensor] | None, str | None]:
+    """The network of LPIPS, if it can be had without a download: (network, None) or (None, reason)."""
+    weights = Path(torch.hub.get_dir()) / "checkpoints" / _LPIPS_WEIGHTS
+    try:
+        import torchvision  # noqa: F401
+    except (ImportError, RuntimeError) as error:
+        return (
+            None,
+            f"LPIPS needs torchvision, which does not import here ({error}); install it beside this torch",
+        )
+    if not weights.is_file():
+        return None, (
+            f"LPIPS needs the VGG-16 weights {_LPIPS_WEIGHTS} in torch's hub folder (checkpoints/), and nothing "
+            "is downloaded unasked: fetch them once by torchvision.models.vgg16(weights='DEFAULT')"
+        )
+    from torchmetrics.image.lpip import LearnedPerceptualImagePatchSimilarity
+
+    return LearnedPerceptualImagePatchSimilarity(net_type="vgg", normalize=True).eval(), None
+
+
+def lpips(prediction: Tensor, truth: Tensor) -> tuple[float | None, str | None]:
+    """Learned perceptual distance (VGG), or None and the reason why it could not be had.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+
+    Source: Zhang 2018; torchmetrics (its linear weights), torchvision (the network).
+    """
+    _check_pair(prediction, truth)
+    network, reason = lpips_network()
+    if network is None:
+        return None, reason
+    pictures = [
+        picture.detach().cpu().float().clamp(0.0, 1.0).movedim(-1, 0)[None] for picture in (prediction, truth)
+    ]
+    with torch.no_grad():
+        return float(network(pictures[0], pictures[1])), None
+
+
+def surface_distances(predicted: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from predicted (N, 3) to true points and from true (M, 3) to predicted points, m.
+
+    Raises:
+        NumericalError: If a coordinate is not finite.
+        ShapeError: If a set is empty or not (N, 3).
+    """
+    for name, points in (("predicted", predicted), ("true", true)):
+        if points.ndim != 2 or points.shape[-1] != 3 or not len(points):
+            raise ShapeError(f"{name}: found shape {points.shape}, expected (N, 3) with at least one point.")
+        check_finite(name, torch.from_numpy(np.asarray(points, dtype=np.float64)))
+    return cKDTree(true).query(predicted)[0], cKDTree(predicted).query(true)[0]
+
+
+def chamfer_mm(predicted: np.ndarray, true: np.ndarray) -> float:
+    """Mean of the two mean distances between point sets (N, 3) and (M, 3) given in m; mm.
+
+    Raises:
+        NumericalError: If a coordinate is not finite.
+        ShapeError: If a set is empty or not (N, 3).
+    """
+    there, back = surface_distances(predicted, true)
+    return float(1000.0 * 0.5 * (there.mean() + back.mean()))
+
+
+def f_score(predicted: np.ndarray, true: np.ndarray, radius: float = F_SCORE_RADIUS_M) -> float:
+    """Harmonic mean of the shares of points (N, 3), (M, 3) that the other set has within the radius, m.
+
+    Raises:
+        NumericalError: If a coordinate is not finite.
+        ShapeError: If a set is empty or not (N, 3).
+
+    Source: Knapitsch 2017 (Tanks and Temples).
+    """
+    there, back = surface_distances(predicted, true)
+    precision, recall = float((there <= radius).mean()), float((back <= radius).mean())
+    total = precision + recall
+    return 2.0 * precision * recall / total if total else 0.0
