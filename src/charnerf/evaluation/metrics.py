@@ -152,8 +152,8 @@ def lpips_network() -> tuple[Callable[[Tensor, Tensor], Tensor] | None, str | No
         )
     if not weights.is_file():
         return None, (
-            f"LPIPS needs the VGG-16 weights {_LPIPS_WEIGHTS} in torch's hub folder (checkpoints/), and nothing "
-            "is downloaded unasked: fetch them once by torchvision.models.vgg16(weights='DEFAULT')"
+            f"LPIPS needs the VGG-16 weights {_LPIPS_WEIGHTS} in torch's hub folder (checkpoints/), and "
+            "nothing is downloaded unasked: fetch them once by torchvision.models.vgg16(weights='DEFAULT')"
         )
     from torchmetrics.image.lpip import LearnedPerceptualImagePatchSimilarity
 

@@ -1,0 +1,243 @@
+"""A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import torch
+import trimesh
+from tqdm import tqdm
+
+from charnerf.data.characters import Character, load_character
+from charnerf.data.layout import names_of, read_dataset
+from charnerf.errors import CharNeRFError, DataError
+from charnerf.evaluation import surface_error
+from charnerf.evaluation.angles import view_angles
+from charnerf.evaluation.baselines import VisualHullBaseline, white_prediction
+from charnerf.evaluation.metrics_file import Collected, collected_metrics, write_metrics
+from charnerf.evaluation.pictures import save_prediction, save_sheet
+from charnerf.evaluation.scores import CharacterScores, score_view, to_cpu
+from charnerf.types import Cameras, LeftOut, RenderOutput, SourceViews
+
+__all__ = [
+    "CameraRendering",
+    "EvaluatedModel",
+    "EvaluatedRenderer",
+    "MakeMesh",
+    "evaluate",
+    "fixed_views",
+    "write_metrics",
+]
+
+MakeMesh = Callable[[Any], tuple[trimesh.Trimesh, LeftOut]]
+"""From a scene to its mesh (world frame, m) and the grid cells that were left out."""
+
+
+class EvaluatedModel(Protocol):
+    """What evaluation asks of a model: `encode` one character (B = 1), then `scene` of it."""
+
+    def encode(self, views: SourceViews) -> Any:
+        """Encode source views, B = 1."""
+
+    def scene(self, encoded: Any, index: int) -> Any:
+        """The scene of one encoded character."""
+
+
+class CameraRendering(Protocol):
+    """A rendering of a camera: fields (H, W) and what was left out."""
+
+    @property
+    def finest(self) -> RenderOutput:
+        """The finest picture."""
+
+    @property
+    def left_out(self) -> LeftOut:
+        """Work that was not done."""
+
+
+class EvaluatedRenderer(Protocol):
+    """What evaluation asks of a renderer."""
+
+    def render_camera(self, scene: Any, camera: Cameras) -> CameraRendering:
+        """Picture of a camera of shape ()."""
+
+
+def fixed_views(character: Character, views: int | Literal["all"]) -> list[int]:
+    """Indices of the frames to evaluate: evenly chosen, the same every time, none of them a source view.
+
+    Raises:
+        DataError: If the character has no such frame.
+    """
+    poses = character.cameras.world_from_camera
+    there = character.sources.present[0]
+    sources = character.sources.cameras.world_from_camera[0][there]
+    parallel = character.sources.cameras.orthographic[0][there]
+    same = (poses[:, None] - sources[None]).abs().amax(dim=(-1, -2)) < 1e-5
+    same &= character.cameras.orthographic[:, None] == parallel[None]
+    frames = torch.arange(len(poses))[~same.any(dim=1)].tolist()
+    if not frames:
+        raise DataError(
+            f"{character.folder}: found no picture beside the source views, expected some to evaluate; "
+            "capture it with more views."
+        )
+    if views == "all" or views >= len(frames):
+        return frames
+    if views < 1:
+        raise DataError(f"views: found {views}, expected at least 1, or 'all'.")
+    return [frames[math.floor((index + 0.5) * len(frames) / views)] for index in range(views)]
+
+
+def evaluate(
+    model: EvaluatedModel,
+    renderer: EvaluatedRenderer,
+    root: str | Path,
+    split: str,
+    *,
+    views: int | Literal["all"],
+    output: Path | None = None,
+    mesh: MakeMesh | None = None,
+    device: torch.device | str = "cpu",
+    baselines: bool = True,
+    train_seconds: float | None = None,
+    progress: bool = True,
+) -> dict[str, Any]:
+    """Measure a model on a split.
+
+    Args:
+        model: Encodes a character's source views and gives its scene.
+        renderer: Draws a scene from a camera.
+        root: Folder of the data set.
+        split: Which of its splits.
+        views: Fixed views a character, evenly chosen among its frames, or "all".
+        output: Folder for the predictions, `images/NAME/000.png` (RGBA, named like the data set's), and one
+        contact sheet a
+            character, `images/NAME/sheet.png`; None keeps none.
+        mesh: Makes a scene's mesh for Chamfer and F-score; None leaves them null.
+        device: Where the model is.
+        baselines: Whether to measure `white` and `visual_hull` too.
+        train_seconds: Training time to report; None where it is unknown.
+        progress: Whether to draw a progress bar with the time left.
+
+    Returns:
+        The content of metrics.json.
+
+    Raises:
+        DataError: If the split is unknown or empty, or a file is missing or wrong.
+        NumericalError: If a prediction is not finite; the message names the picture.
+    """
+    device = torch.device(device)
+    names = names_of(read_dataset(root), split)
+    state = Collected(device, ("ours", "white", "visual_hull") if baselines else ("ours",))
+    with (
+        state.watch,
+        tqdm(total=len(names), desc=f"evaluate {split}", unit="character", disable=not progress) as bar,
+    ):
+        for name in names:
+            character = load_character(root, name)
+            indices = fixed_views(character, views)
+            _evaluate_character(state, model, renderer, character, indices, output=output, mesh=mesh, bar=bar)
+    return collected_metrics(state, names, split=split, train_seconds=train_seconds)
+
+
+def _evaluate_character(
+    state: Collected,
+    model: EvaluatedModel,
+    renderer: EvaluatedRenderer,
+    character: Character,
+    indices: list[int],
+    *,
+    output: Path | None,
+    mesh: MakeMesh | None,
+    bar: "tqdm[Any]",
+) -> None:
+    """Add one character to what is collected."""
+    watch, name = state.watch, character.name
+    sources = character.sources.to(watch.device)
+    with torch.no_grad():
+        with watch.stage("encode"):
+            scene = model.scene(model.encode(sources), 0)
+        drawn: dict[str, list[RenderOutput]] = {method: [] for method in state.scores}
+        for index in indices:
+            with watch.stage("render"):
+                rendering = renderer.render_camera(scene, character.cameras[index].to(watch.device))
+            state.left_out += rendering.left_out
+            drawn["ours"].append(to_cpu(rendering.finest, name=f"{name}, view {index}"))
+            bar.update(1.0 / len(indices))
+        surface = None if mesh is None else _make_mesh(state, mesh, scene)
+    truth = None if character.mesh_file is None else surface_error.true_points(character.mesh_file)
+    hull_mesh = _draw_baselines(state, drawn, character, indices)
+    images = character.images(indices)
+    _score(state, character, indices, images, drawn)
+    for method, found in (
+        ("ours", surface),
+        ("white", "the white picture has no surface"),
+        ("visual_hull", hull_mesh),
+    ):
+        if method in state.scores:
+            _score_surface(state.scores[method][name], found, truth, character.cameras)
+    if output is not None:
+        stems = [character.image_files[index].stem for index in indices]
+        for stem, picture in zip(stems, drawn["ours"], strict=True):
+            save_prediction(output / "images" / name / f"{stem}.png", picture)
+        save_sheet(output / "images" / name / "sheet.png", character, indices, images, drawn)
+
+
+def _make_mesh(state: Collected, mesh: MakeMesh, scene: Any) -> trimesh.Trimesh | str:
+    """The scene's mesh, or why it has none."""
+    try:
+        with state.watch.stage("mesh"):
+            surface, left_out = mesh(scene)
+    except CharNeRFError as error:
+        return str(error)
+    state.left_out += left_out
+    return surface
+
+
+def _draw_baselines(
+    state: Collected, drawn: dict[str, list[RenderOutput]], character: Character, indices: list[int]
+) -> trimesh.Trimesh | None:
+    """Draw the baselines of one character; returns the hull's mesh."""
+    if "visual_hull" not in drawn:
+        return None
+    with state.watch.stage("hull_encode"):
+        hull = VisualHullBaseline(character.sources)
+    for index in indices:
+        camera = character.cameras[index]
+        drawn["white"].append(white_prediction(camera))
+        with state.watch.stage("hull_render"):
+            drawn["visual_hull"].append(hull.render(camera))
+    return hull.mesh
+
+
+def _score(
+    state: Collected,
+    character: Character,
+    indices: list[int],
+    images: torch.Tensor,
+    drawn: dict[str, list[RenderOutput]],
+) -> None:
+    """Measure every picture of one character."""
+    angles = view_angles(character.cameras[indices], character.sources)
+    for method, pictures in drawn.items():
+        scores = state.scores[method][character.name] = CharacterScores()
+        for place, picture in enumerate(pictures):
+            record = {
+                "azimuth_deg": float(angles.azimuth_deg[place]),
+                "elevation_deg": float(angles.elevation_deg[place]),
+                "source_angle_deg": float(angles.source_deg[place]),
+            }
+            scores.views.append(score_view(picture, images[place], record, reasons=scores.reasons))
+
+
+def _score_surface(
+    scores: CharacterScores, found: trimesh.Trimesh | str | None, truth: Any, cameras: Cameras
+) -> None:
+    """Measure a mesh against the captured one, or note why there is nothing to measure."""
+    if truth is None:
+        scores.surface, reasons = surface_error.missing_surface("the data set has no mesh of the character")
+    elif isinstance(found, str):
+        scores.surface, reasons = surface_error.missing_surface(found)
+    else:
+        scores.surface, reasons = surface_error.surface_scores(found, truth, cameras)
+    scores.reasons |= reasons

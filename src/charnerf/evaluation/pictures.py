@@ -1,0 +1,110 @@
+"""Pictures that stay: predictions as PNG, and one contact sheet a character."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image, ImageDraw, ImageFont
+from torch import Tensor
+
+from charnerf.data.characters import Character
+from charnerf.evaluation.angles import view_angles
+from charnerf.evaluation.scores import on_white
+from charnerf.types import RenderOutput
+
+_SHEET_COLUMNS = 8
+_LABEL_WIDTH = 76
+_HEADER = 16
+_INK = (60, 60, 60)
+
+
+def to_bytes(values: Tensor) -> np.ndarray:
+    """Numbers in [0, 1] as bytes of the same shape."""
+    return (values.detach().clamp(0.0, 1.0) * 255.0).round().to(torch.uint8).cpu().numpy()
+
+
+def save_picture(path: Path, picture: Image.Image) -> None:
+    """Write a PNG in one step, with the folders it needs."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = path.with_name(f".{path.name}.part")
+    picture.save(aside, format="PNG")
+    aside.replace(path)
+
+
+def save_prediction(path: Path, prediction: RenderOutput) -> None:
+    """Keep a prediction (H, W) as RGBA with straight alpha, so that a metric can be added later."""
+    alpha = prediction.opacity[..., None]
+    straight = (prediction.rgb - (1.0 - alpha)) / alpha.clamp_min(1.0 / 255.0)
+    save_picture(path, Image.fromarray(to_bytes(torch.cat((straight, alpha), dim=-1))))
+
+
+def depth_picture(prediction: RenderOutput) -> Tensor:
+    """Depth (H, W) as grey (H, W, 3): near is dark, far light, nothing white."""
+    seen = prediction.opacity > 0.5
+    if not bool(seen.any()):
+        return torch.ones_like(prediction.rgb)
+    near, far = (float(value) for value in torch.aminmax(prediction.depth[seen]))
+    grey = 0.1 + 0.75 * (prediction.depth - near) / max(far - near, 1e-3)
+    return torch.where(seen, grey, 1.0)[..., None].expand(-1, -1, 3)
+
+
+def _panels(
+    chosen: Sequence[int], images: Tensor, drawn: Mapping[str, Sequence[RenderOutput]]
+) -> list[tuple[str, list[Tensor]]]:
+    """Rows of the sheet: label and pictures (H, W, 3)."""
+    ours = [drawn["ours"][place] for place in chosen]
+    rows = [
+        ("truth", [on_white(images[place])[0] for place in chosen]),
+        ("prediction", [picture.rgb for picture in ours]),
+    ]
+    if "visual_hull" in drawn:
+        rows.append(("visual hull", [drawn["visual_hull"][place].rgb for place in chosen]))
+    rows.append(("opacity", [1.0 - picture.opacity[..., None].expand(-1, -1, 3) for picture in ours]))
+    rows.append(("depth", [depth_picture(picture) for picture in ours]))
+    return rows
+
+
+def save_sheet(
+    path: Path,
+    character: Character,
+    indices: Sequence[int],
+    images: Tensor,
+    drawn: Mapping[str, Sequence[RenderOutput]],
+) -> None:
+    """Write a character's contact sheet: its drawings, then truth, prediction, hull, opacity and depth.
+
+    Args:
+        path: PNG file.
+        character: The character.
+        indices: Its evaluated frames (n).
+        images: Their true pictures, bytes (n, H, W, 4).
+        drawn: Predictions (n) by method; "ours" and perhaps "visual_hull".
+    """
+    angles = view_angles(character.cameras[list(indices)], character.sources)
+    order = torch.argsort(angles.azimuth_deg).tolist()
+    count = min(_SHEET_COLUMNS, len(order))
+    chosen = [order[round(step * (len(order) - 1) / max(count - 1, 1))] for step in range(count)]
+    width, height = character.cameras.width, character.cameras.height
+    rows = _panels(chosen, images, drawn)
+    columns = max(count, len(character.source_names))
+    size = (_LABEL_WIDTH + columns * width, (len(rows) + 1) * height + 2 * _HEADER)
+    sheet = Image.new("RGB", size, "white")
+    pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(11)
+    pen.text((4, _HEADER + height // 2), "drawings", _INK, font)
+    for place, name in enumerate(character.source_names):
+        pen.text((_LABEL_WIDTH + place * width + 4, 1), name, _INK, font)
+        source = character.sources.images[0, place].movedim(0, -1)
+        shown = Image.fromarray(to_bytes(on_white(source * 255.0)[0])).resize((width, height))
+        sheet.paste(shown, (_LABEL_WIDTH + place * width, _HEADER))
+    top = height + _HEADER
+    for column, place in enumerate(chosen):
+        azimuth, elevation = float(angles.azimuth_deg[place]), float(angles.elevation_deg[place])
+        label = f"{azimuth:.0f}°, up {elevation:.0f}°"
+        pen.text((_LABEL_WIDTH + column * width + 4, top + 1), label, _INK, font)
+    for row, (label, pictures) in enumerate(rows):
+        y = top + _HEADER + row * height
+        pen.text((4, y + height // 2), label, _INK, font)
+        for column, picture in enumerate(pictures):
+            sheet.paste(Image.fromarray(to_bytes(picture)), (_LABEL_WIDTH + column * width, y))
+    save_picture(path, sheet)

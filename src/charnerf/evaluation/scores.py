@@ -1,0 +1,84 @@
+"""Every metric of one view, and their means with the reasons for what is missing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from charnerf.checks import check_finite
+from charnerf.evaluation import metrics
+from charnerf.evaluation.angles import Record, mean_of, mean_over_characters
+from charnerf.types import RenderOutput
+
+VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou")
+SURFACE_KEYS = ("chamfer_mm", "f_score")
+METRIC_KEYS = VIEW_KEYS + SURFACE_KEYS
+
+
+@dataclass
+class CharacterScores:
+    """One method on one character.
+
+    Attributes:
+        views: A record a view: VIEW_KEYS, azimuth_deg, elevation_deg, source_angle_deg.
+        surface: SURFACE_KEYS.
+        reasons: Why a key is missing.
+    """
+
+    views: list[Record] = field(default_factory=list)
+    surface: dict[str, float | None] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+
+
+def on_white(image: Tensor) -> tuple[Tensor, Tensor]:
+    """An RGBA picture of bytes (H, W, 4) as colours on white (H, W, 3) and alpha (H, W), in [0, 1]."""
+    rgba = image.float() / 255.0
+    alpha = rgba[..., 3]
+    return rgba[..., :3] * alpha[..., None] + (1.0 - alpha[..., None]), alpha
+
+
+def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
+    """A rendering on the CPU in float32, clamped to [0, 1] after the check that it is finite.
+
+    Raises:
+        NumericalError: If it holds NaN or infinity; the message names the picture.
+    """
+    moved = output.to("cpu", torch.float32)
+    check_finite(f"{name}: rgb", moved.rgb)
+    check_finite(f"{name}: opacity", moved.opacity)
+    return RenderOutput(moved.rgb.clamp(0.0, 1.0), moved.opacity.clamp(0.0, 1.0), moved.depth)
+
+
+def score_view(prediction: RenderOutput, image: Tensor, angles: Record, *, reasons: dict[str, str]) -> Record:
+    """All metrics of a prediction against the true bytes (H, W, 4); notes in `reasons` why one is missing."""
+    truth, alpha = on_white(image)
+    perceptual, why = metrics.lpips(prediction.rgb, truth)
+    if why is not None:
+        reasons["lpips"] = why
+    foreground = metrics.psnr_foreground(prediction.rgb, truth, alpha)
+    if foreground is None:
+        reasons["psnr_foreground"] = "no pixel has a true alpha above 0.5"
+    return {
+        "psnr": metrics.psnr(prediction.rgb, truth),
+        "psnr_foreground": foreground,
+        "ssim": metrics.ssim(prediction.rgb, truth),
+        "lpips": perceptual,
+        "flip": metrics.flip(prediction.rgb, truth),
+        "silhouette_iou": metrics.silhouette_iou(prediction.opacity, alpha),
+        **angles,
+    }
+
+
+def summarize(characters: Sequence[CharacterScores]) -> dict[str, Any]:
+    """Means over a character's views, then over characters; null with `<key>_reason` where there is none."""
+    found: dict[str, Any] = mean_over_characters([scores.views for scores in characters], VIEW_KEYS)
+    found |= mean_of([scores.surface for scores in characters], SURFACE_KEYS)
+    summary: dict[str, Any] = {}
+    for key in METRIC_KEYS:
+        summary[key] = found[key]
+        if found[key] is None:
+            reasons = [scores.reasons[key] for scores in characters if key in scores.reasons]
+            summary[f"{key}_reason"] = reasons[0] if reasons else "no view was evaluated"
+    return summary
