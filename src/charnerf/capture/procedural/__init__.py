@@ -1,0 +1,1 @@
+"""Embedded characters: many different humanoids from a seed, without any file."""
