@@ -6,6 +6,7 @@ Frames (design): world in metres, +Z up, facing -Y; cameras OpenGL/Blender (+X r
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -131,6 +132,36 @@ class FieldOutput(TensorRecord):
     densities: Tensor
 
 
+FieldFunction = Callable[[Tensor, Tensor], FieldOutput]
+"""Answers points (P, 3), m, seen along unit directions (P, 3), zero for "no direction"."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One character as renderers and mesh extraction see it: functions of points, not networks.
+
+    Attributes:
+        coarse: Field of the coarse pass.
+        fine: Field of the fine pass, None where the model has none.
+        hull: The character's hull (no B axis), None for a model without.
+        box_min: Lower corner of the space looked at, (3,), m.
+        box_max: Upper corner, (3,), m.
+        density_sees_directions: Whether densities depend on the query direction.
+    """
+
+    coarse: FieldFunction
+    fine: FieldFunction | None
+    hull: Hull | None
+    box_min: Tensor
+    box_max: Tensor
+    density_sees_directions: bool
+
+    @property
+    def field(self) -> FieldFunction:
+        """The finest field there is."""
+        return self.coarse if self.fine is None else self.fine
+
+
 @dataclass(frozen=True)
 class RenderOutput(TensorRecord):
     """What volume rendering gives for rays (...).
@@ -169,3 +200,12 @@ class LeftOut:
             "grid_cells": (self.grid_cells, self.grid_cells_of),
         }
         return {name: (part / whole if whole else None) for name, (part, whole) in pairs.items()}
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A rendering by the finest pass, the coarse pass where there were two, and what was left out."""
+
+    finest: RenderOutput
+    coarse: RenderOutput | None
+    left_out: LeftOut

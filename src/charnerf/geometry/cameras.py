@@ -41,7 +41,9 @@ def direction_from_angles(azimuth_deg: Tensor, elevation_deg: Tensor) -> Tensor:
     """Unit vectors (..., 3) from the character to a camera at the given angles (...), degrees."""
     azimuth, elevation = torch.deg2rad(azimuth_deg), torch.deg2rad(elevation_deg)
     level = torch.cos(elevation)
-    return torch.stack((level * torch.sin(azimuth), -level * torch.cos(azimuth), torch.sin(elevation)), dim=-1)
+    return torch.stack(
+        (level * torch.sin(azimuth), -level * torch.cos(azimuth), torch.sin(elevation)), dim=-1
+    )
 
 
 def angles_from_direction(directions: Tensor) -> tuple[Tensor, Tensor]:
@@ -96,7 +98,9 @@ def cameras_towards(
         ValueError: If the distance does not exceed the half extent.
     """
     if not distance > half_extent > 0.0:
-        raise ValueError(f"distance: found {distance} m, expected more than half_extent = {half_extent} m > 0.")
+        raise ValueError(
+            f"distance: found {distance} m, expected more than half_extent = {half_extent} m > 0."
+        )
     pose = look_at(target + distance * directions, target.expand_as(directions))
     if orthographic:
         focal = size / (2.0 * half_extent)
@@ -175,7 +179,9 @@ def pixel_rays(cameras: Cameras, pixels: Tensor) -> RayBundle:
     x, y = flat[..., 0], -flat[..., 1]
     zero, one = torch.zeros_like(x), torch.ones_like(x)
     parallel = cameras.orthographic
-    local_direction = torch.stack((torch.where(parallel, zero, x), torch.where(parallel, zero, y), -one), dim=-1)
+    local_direction = torch.stack(
+        (torch.where(parallel, zero, x), torch.where(parallel, zero, y), -one), dim=-1
+    )
     local_origin = torch.stack((torch.where(parallel, x, zero), torch.where(parallel, y, zero), zero), dim=-1)
     rotation = cameras.world_from_camera[..., :3, :3]
     directions = safe_normalize((rotation * local_direction[..., None, :]).sum(-1))
@@ -204,7 +210,9 @@ def project_into_all(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, 
     rotation = cameras.world_from_camera[:, :3, :3]  # (V, 3 world, 3 camera)
     offset = (rotation * cameras.world_from_camera[:, :3, 3:]).sum(1)  # (V, 3): camera centre in its own axes
     num_views = rotation.shape[0]
-    local = (points @ rotation.permute(1, 0, 2).reshape(3, num_views * 3)).unflatten(-1, (num_views, 3)) - offset
+    local = (points @ rotation.permute(1, 0, 2).reshape(3, num_views * 3)).unflatten(
+        -1, (num_views, 3)
+    ) - offset
     depth = -local[..., 2]
     in_front = depth > 1e-6
     divisor = torch.where(cameras.orthographic, torch.ones_like(depth), torch.where(in_front, depth, 1.0))

@@ -50,7 +50,10 @@ def build_hull(
     Raises:
         DataError: If a source view shows nothing, or no dilation up to 32 pixels reaches the coverage.
     """
-    hulls = [_carve(views[b], box_min, box_max, grid_size, dilation, coverage) for b in range(views.present.shape[0])]
+    hulls = [
+        _carve(views[b], box_min, box_max, grid_size, dilation, coverage)
+        for b in range(views.present.shape[0])
+    ]
     return Hull(
         *(
             torch.stack([getattr(hull, name) for hull in hulls])
@@ -102,7 +105,9 @@ def _carve(
     carving = (views.present & ~views.mirrored).nonzero()[:, 0].tolist()
     for view in carving:
         if not bool(masks[view].any()):
-            raise DataError(f"source view {view}: found an empty silhouette (alpha is 0 everywhere), expected a figure.")
+            raise DataError(
+                f"source view {view}: found an empty silhouette (alpha is 0 everywhere), expected a figure."
+            )
     outside = torch.stack([_distance_to(mask) for mask in masks])
     dilations = torch.full((len(masks),), float(dilation), device=masks.device)
     while True:
@@ -131,14 +136,18 @@ def _distance_to(mask: Tensor) -> Tensor:
     return torch.from_numpy(distance).to(mask.device, torch.float32)
 
 
-def _may_touch(outside: Tensor, cameras: Cameras, dilations: Tensor, centres: Tensor, radius: Tensor) -> Tensor:
+def _may_touch(
+    outside: Tensor, cameras: Cameras, dilations: Tensor, centres: Tensor, radius: Tensor
+) -> Tensor:
     """Whether balls around centres (P, 3) of a radius, m, may project into every silhouette, (P,) bool."""
     height, width = outside.shape[-2:]
     keep = torch.arange(len(centres), device=centres.device)
     for view in range(len(outside)):
         pixels, depth, in_front = project_into_all(cameras[view : view + 1], centres[keep])
         pixels, depth, in_front = pixels[:, 0], depth[:, 0], in_front[:, 0]
-        clamped = torch.stack((pixels[:, 0].clamp(0, width - 1e-3), pixels[:, 1].clamp(0, height - 1e-3)), dim=-1)
+        clamped = torch.stack(
+            (pixels[:, 0].clamp(0, width - 1e-3), pixels[:, 1].clamp(0, height - 1e-3)), dim=-1
+        )
         x, y = clamped.long().unbind(-1)
         nearest = outside[view, y, x]
         # beyond the frame nothing is known where the figure touches the border, and all is background elsewhere
@@ -158,7 +167,9 @@ def _occupancy(
     side = min(32, grid_size)
     axis = torch.arange(side, device=low.device)
     index = torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1).reshape(-1, 3)
-    octants = torch.stack(torch.meshgrid(*[torch.arange(2, device=low.device)] * 3, indexing="ij"), dim=-1).reshape(1, 8, 3)
+    octants = torch.stack(
+        torch.meshgrid(*[torch.arange(2, device=low.device)] * 3, indexing="ij"), dim=-1
+    ).reshape(1, 8, 3)
     while True:
         cell = (high - low) / side
         centres = low + (index + 0.5) * cell

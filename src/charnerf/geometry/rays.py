@@ -27,8 +27,12 @@ def box_interval(rays: RayBundle, box_min: Tensor, box_max: Tensor) -> tuple[Ten
     first, second = (box_min - rays.origins) * inverse, (box_max - rays.origins) * inverse
     inside = (rays.origins >= box_min) & (rays.origins <= box_max)
     infinity = torch.full_like(first, torch.inf)
-    entry = torch.where(parallel, torch.where(inside, -infinity, infinity), torch.minimum(first, second)).amax(-1)
-    leave = torch.where(parallel, torch.where(inside, infinity, -infinity), torch.maximum(first, second)).amin(-1)
+    entry = torch.where(
+        parallel, torch.where(inside, -infinity, infinity), torch.minimum(first, second)
+    ).amax(-1)
+    leave = torch.where(
+        parallel, torch.where(inside, infinity, -infinity), torch.maximum(first, second)
+    ).amin(-1)
     near = entry.clamp_min(0.0)
     hit = leave > near
     zero = torch.zeros_like(near)
@@ -48,7 +52,9 @@ def occupied_to_t(t_edges: Tensor, occupied: Tensor, s_vals: Tensor) -> Tensor:
     """
     lengths = torch.diff(t_edges, dim=-1) * occupied
     cumulated = lengths.cumsum(-1)
-    last = torch.where(occupied, torch.arange(occupied.shape[-1], device=occupied.device), 0).amax(-1, keepdim=True)
+    last = torch.where(occupied, torch.arange(occupied.shape[-1], device=occupied.device), 0).amax(
+        -1, keepdim=True
+    )
     step = torch.minimum(torch.searchsorted(cumulated, s_vals.contiguous(), right=True), last)
     before = torch.gather(cumulated - lengths, -1, step)
     return torch.gather(t_edges, -1, step) + (s_vals - before).clamp_min(0.0)

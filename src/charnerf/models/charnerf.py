@@ -1,0 +1,226 @@
+"""The model: drawings -> encoder -> feature maps -> scenes that answer points with colour and density."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import final
+
+import torch
+from torch import Tensor, nn
+
+from charnerf.errors import ShapeError
+from charnerf.geometry.cameras import directions_to_points, project_into_all
+from charnerf.geometry.encoding import positional_encoding
+from charnerf.geometry.hull import build_hull
+from charnerf.models.encoders.base import AbstractEncoder
+from charnerf.models.features.base import AbstractFeatures, ViewReadings
+from charnerf.models.field import Field
+from charnerf.models.inputs import PointInputs
+from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
+from charnerf.models.views.base import AbstractViews
+from charnerf.types import FieldOutput, Hull, Scene, SourceViews, TensorRecord
+
+HULL_DEPTH_FADE = 20.0  # per half-extent: a point this share behind the hull's front counts as hidden by 1/e
+
+
+@dataclass(frozen=True)
+class EncodedViews(TensorRecord):
+    """Characters, encoded once.
+
+    Attributes:
+        views: The source views used, (B, V), mirrored ones included.
+        feature_maps: W^i = E(I_i), (B, V, F, h, w).
+        hull: Their hulls, or None for a model without.
+    """
+
+    views: SourceViews
+    feature_maps: Tensor
+    hull: Hull | None
+
+
+@final
+class CharNeRF(nn.Module):
+    """Encoder, source views rule and one or two fields.
+
+    Args:
+        encoder: E.
+        views: Which views are used.
+        features: Further inputs of f1.
+        coarse: The field of the coarse pass.
+        fine: The field of the fine pass, or None where the configuration has none.
+        num_frequencies: nu of eq. 1.
+        box_centre: Centre of the space looked at, m, 3 numbers.
+        box_half_extent: Half of its side, m; coordinates are scaled by it before eq. 1, so that they stay in (-1, 1).
+        hull: Whether the visual hull belongs to the model.
+
+    Source: paper, Overview.
+    """
+
+    def __init__(
+        self,
+        *,
+        encoder: AbstractEncoder,
+        views: AbstractViews,
+        features: AbstractFeatures,
+        coarse: Field,
+        fine: Field | None,
+        num_frequencies: int,
+        box_centre: list[float],
+        box_half_extent: float,
+        hull: bool,
+    ) -> None:
+        super().__init__()
+        self.encoder = encoder
+        self.views = views
+        self.features = features
+        self.coarse = coarse
+        self.fine = fine
+        self.num_frequencies = num_frequencies
+        self.box_half_extent = float(box_half_extent)
+        self.register_buffer("box_centre", torch.tensor(box_centre, dtype=torch.float32), persistent=False)
+        self.has_hull = hull
+
+    @property
+    def box(self) -> tuple[Tensor, Tensor]:
+        """Lower and upper corner of the space looked at, (3,) each, m."""
+        return self.box_centre - self.box_half_extent, self.box_centre + self.box_half_extent  # type: ignore[operator]
+
+    def carve(self, views: SourceViews) -> Hull | None:
+        """Hulls of drawings (B, V), for callers who keep them; None for a model without a hull."""
+        if not self.has_hull:
+            return None
+        box_min, box_max = self.box
+        return build_hull(self.views(views), box_min=box_min, box_max=box_max)
+
+    def encode(self, views: SourceViews, hull: Hull | None = None) -> EncodedViews:
+        """Encode characters once.
+
+        Args:
+            views: Drawings, (B, V), V from 1 to 8; padded views are marked absent.
+            hull: Their hulls from `carve`, carved here if not given.
+
+        Returns:
+            What `scene` needs.
+
+        Raises:
+            ShapeError: If the pictures' sides do not suit the encoder.
+        """
+        height, width = views.images.shape[-2:]
+        multiple = self.encoder.multiple
+        if height % multiple or width % multiple:
+            raise ShapeError(
+                f"source_views.images: found {width} x {height} pixels, expected sides that are multiples of {multiple} "
+                "(the encoder halves them that often). Resize or pad the drawings."
+            )
+        if hull is None:
+            hull = self.carve(views)
+        used = self.views(views)
+        rgb, alpha = used.images[:, :, :3], used.images[:, :, 3:]
+        on_white = rgb * alpha + (1.0 - alpha)
+        pixels = torch.cat((2.0 * on_white - 1.0, 2.0 * alpha - 1.0), dim=2).flatten(0, 1)
+        maps = self.encoder(pixels.contiguous(memory_format=torch.channels_last))
+        return EncodedViews(views=used, feature_maps=maps.unflatten(0, used.present.shape), hull=hull)
+
+    def scene(self, encoded: EncodedViews, index: int) -> Scene:
+        """One character of a batch as a scene for a renderer; its absent views are dropped here."""
+        views = encoded.views[index]
+        present = views.present.nonzero()[:, 0]
+        views = views[present]
+        hull = encoded.hull[index] if encoded.hull is not None else None
+        maps = encoded.feature_maps[index][present]
+        rows = maps_to_rows(maps)
+        pictures = _picture_rows(views)
+        depths = None if hull is None else _hull_rows(hull, present)
+        answer = partial(
+            self._answer, views=views, map_size=(maps.shape[-1], maps.shape[-2]), pictures=pictures
+        )
+
+        def field_of(field: Field) -> Callable[[Tensor, Tensor], FieldOutput]:
+            return partial(answer, field=field, latents=field.hoist(rows), hull_rows=depths)
+
+        box_min, box_max = self.box
+        return Scene(
+            coarse=field_of(self.coarse),
+            fine=None if self.fine is None else field_of(self.fine),
+            hull=hull,
+            box_min=box_min,
+            box_max=box_max,
+            density_sees_directions=self.coarse.density.sees_directions,
+        )
+
+    def _answer(
+        self,
+        points: Tensor,
+        view_dirs: Tensor,
+        *,
+        field: Field,
+        latents: Tensor,
+        views: SourceViews,
+        map_size: tuple[int, int],
+        pictures: Tensor,
+        hull_rows: tuple[Tensor, int, int] | None,
+    ) -> FieldOutput:
+        """Colour and density of points (P, 3) seen along view_dirs (P, 3)."""
+        num_points, num_views = points.shape[0], views.present.shape[0]
+        cameras = views.cameras
+        pixels, depth, in_front = project_into_all(cameras, points)
+        size = pixels.new_tensor((cameras.width, cameras.height))
+        valid = in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)
+        read = partial(bilinear_rows, width=map_size[0], height=map_size[1])
+        read_latents = read_rows(latents, *read(pixels * (pixels.new_tensor(map_size) / size)))
+        source_rgb = read_rows(pictures, *bilinear_rows(pixels, width=cameras.width, height=cameras.height))
+        source_rgb = source_rgb.unflatten(0, (num_points, num_views))
+        source_dirs = directions_to_points(cameras, points)
+        behind, edge = self._read_hull(hull_rows, cameras, pixels / size, depth, points)
+        readings = ViewReadings(
+            source_rgb=source_rgb,
+            behind=behind,
+            edge=edge,
+            source_dirs=source_dirs,
+            mirrored=views.mirrored.to(points.dtype),
+        )
+        inputs = PointInputs(
+            latents=read_latents.unflatten(0, (num_points, num_views)) * valid[..., None],
+            extras=self.features(readings),
+            source_rgb=source_rgb,
+            visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
+            valid=valid,
+            encoded_points=positional_encoding(
+                (points - self.box_centre) / self.box_half_extent, self.num_frequencies
+            ),
+            view_dirs=view_dirs,
+            source_dirs=source_dirs,
+        )
+        return field(inputs)
+
+    def _read_hull(
+        self,
+        hull_rows: tuple[Tensor, int, int] | None,
+        cameras: object,
+        shares: Tensor,
+        depth: Tensor,
+        points: Tensor,
+    ) -> tuple[Tensor, Tensor]:
+        """Distance behind the hull's front, in half-extents, and distance from the mask's edge, in picture sides, (P, V) each."""
+        if hull_rows is None:
+            return torch.zeros_like(depth), torch.zeros_like(depth)
+        rows, width, height = hull_rows
+        read = read_rows(
+            rows, *bilinear_rows(shares * shares.new_tensor((width, height)), width=width, height=height)
+        )
+        front, edge = read.unflatten(0, depth.shape).unbind(-1)
+        centres = cameras.world_from_camera[:, :3, 3]  # type: ignore[attr-defined]
+        along_ray = torch.where(cameras.orthographic, depth, (points[:, None] - centres).norm(dim=-1))  # type: ignore[attr-defined]
+        return (along_ray - front) / self.box_half_extent, edge / cameras.width  # type: ignore[attr-defined]
+
+
+def _picture_rows(views: SourceViews) -> Tensor:
+    """Colours of the drawings on white as rows (V * H * W, 3)."""
+    rgb, alpha = views.images[:, :3], views.images[:, 3:]
+    return maps_to_rows(rgb * alpha + (1.0 - alpha))
+
+
+def _hull_rows(hull: Hull, present: Tensor) -> tuple[Tensor, int, int]:
+    """Front depths and edge distances of the present views as rows (V * h * w, 2), with the maps' width and height."""
+    maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
+    return maps_to_rows(maps), maps.shape[-1], maps.shape[-2]

@@ -1,0 +1,56 @@
+"""What the two attention combinators share: projections, heads, residual, the mean over rows."""
+
+import math
+
+import torch
+from torch import Tensor, nn
+
+from charnerf.models.combinators.base import masked_logits, view_weights
+
+
+class AttentionParts(nn.Module):
+    """Projections and the softmax over views; logits come from the combinator.
+
+    Args:
+        width: D, a multiple of num_heads.
+        num_heads: K.
+        residual: Add the features to the attended values and normalise (off in the paper's plain form).
+        temperature: Start of a learned factor on the feature logits (1 and fixed in the plain form: None).
+    """
+
+    def __init__(self, *, width: int, num_heads: int, residual: bool, temperature: float | None) -> None:
+        super().__init__()
+        self.num_heads = num_heads
+        self.queries = nn.Linear(width, width, bias=False)
+        self.keys = nn.Linear(width, width, bias=False)
+        self.values = nn.Linear(width, width, bias=False)
+        self.norm: nn.Module | None = nn.LayerNorm(width) if residual else None
+        self.output: nn.Module | None = nn.Linear(width, width) if residual else None
+        self.log_temperature = (
+            None if temperature is None else nn.Parameter(torch.tensor(math.log(temperature)))
+        )
+
+    def split(self, x: Tensor) -> Tensor:
+        """Split (P, V, D) into heads, (P, V, K, D / K)."""
+        return x.unflatten(-1, (self.num_heads, -1))
+
+    def feature_logits(self, queries: Tensor, keys: Tensor) -> Tensor:
+        """Dot products of every query with every key, (P, K, V query, V key), times the temperature.
+
+        Written as sums: with three or four views a general matrix product costs far more than its arithmetic.
+        """
+        logits = (queries[:, :, None] * keys[:, None]).sum(-1).permute(0, 3, 1, 2)
+        return logits if self.log_temperature is None else logits * self.log_temperature.exp()
+
+    def attend(self, logits: Tensor, view_features: Tensor, valid: Tensor) -> Tensor:
+        """Attention with logits (P, K, V, V) over features (P, V, D), then the mean over rows: (P, D)."""
+        weights = torch.softmax(masked_logits(logits, valid), dim=-1)
+        # the mean over rows commutes with the weighted sum of values: average the weights first
+        row_weights = view_weights(valid, weights.dtype)
+        averaged = (weights * row_weights[:, None, :, None]).sum(2)  # (P, K, V key)
+        values = self.split(self.values(view_features))
+        fused = (averaged.transpose(1, 2)[..., None] * values).sum(1).flatten(-2)  # (P, D)
+        if self.norm is None or self.output is None:
+            return fused
+        mean = (view_features * row_weights[..., None]).sum(1)
+        return self.norm(mean + self.output(fused))

@@ -1,0 +1,37 @@
+"""H = a mean with weights learned from each view's feature and angle (beyond the paper)."""
+
+from typing import final
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from charnerf.models.combinators.base import AbstractCombinator, masked_logits
+
+
+@final
+class LearnedWeights(AbstractCombinator):
+    """Softmax over the views of a small network's score of (feature, cosine to the query, source direction).
+
+    Args:
+        width: D.
+        hidden: Width of the scoring network.
+    """
+
+    sees_query = True
+
+    def __init__(self, *, width: int, hidden: int) -> None:
+        super().__init__()
+        self.from_features = nn.Linear(width, hidden)
+        self.from_angles = nn.Linear(4, hidden, bias=False)
+        self.score = nn.Linear(hidden, 1)
+        nn.init.zeros_(self.score.weight)  # the start is the mean
+        nn.init.zeros_(self.score.bias)
+
+    def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
+        """Fuse (P, V, D) to (P, D)."""
+        cosines = (view_dirs[:, None] * source_dirs).sum(-1, keepdim=True)
+        angles = self.from_angles(torch.cat((cosines, source_dirs), dim=-1))
+        logits = self.score(F.relu(self.from_features(view_features) + angles))[..., 0]
+        weights = torch.softmax(masked_logits(logits, valid), dim=-1)
+        return (view_features * weights[..., None]).sum(1)

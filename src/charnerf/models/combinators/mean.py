@@ -1,0 +1,18 @@
+"""H = the mean over the views (pixelNeRF; the paper's row "no MHA")."""
+
+from typing import final
+
+from torch import Tensor
+
+from charnerf.models.combinators.base import AbstractCombinator, view_weights
+
+
+@final
+class Mean(AbstractCombinator):
+    """Mean over the views that see the point."""
+
+    sees_query = False
+
+    def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
+        """Average (P, V, D) to (P, D)."""
+        return (view_features * view_weights(valid, view_features.dtype)[..., None]).sum(1)

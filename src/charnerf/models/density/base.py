@@ -1,0 +1,39 @@
+"""How the query direction enters: the wiring of f1, H and f2."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from torch import Tensor, nn
+
+from charnerf.models.combinators.base import AbstractCombinator
+from charnerf.models.inputs import PointInputs
+from charnerf.models.stages import MultiView, SingleView
+
+
+@dataclass(frozen=True)
+class TrunkOutput:
+    """raw densities (P,), features for the colour head (P, D) and per-view features (P, V, D)."""
+
+    raw_densities: Tensor
+    features: Tensor
+    view_features: Tensor
+
+
+class AbstractDensity(nn.Module, ABC):
+    """The wiring of f1, H and f2 from inputs to raw density and colour features.
+
+    Attributes:
+        sees_directions: Whether the density depends on the query direction.
+    """
+
+    sees_directions: bool
+
+    @abstractmethod
+    def forward(
+        self,
+        inputs: PointInputs,
+        single_view: SingleView,
+        combinator: AbstractCombinator,
+        multi_view: MultiView,
+    ) -> TrunkOutput:
+        """Run the trunk for points (P)."""

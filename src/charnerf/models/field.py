@@ -1,0 +1,70 @@
+"""One radiance field: lookup -> f1 -> H -> f2 -> colour and density. Coarse and fine are two of these over one encoder."""
+
+from typing import final
+
+from torch import Tensor, nn
+
+from charnerf.models.combinators.base import AbstractCombinator
+from charnerf.models.density.base import AbstractDensity
+from charnerf.models.heads.base import AbstractHead
+from charnerf.models.inputs import PointInputs
+from charnerf.models.stages import MultiView, SingleView
+from charnerf.types import FieldOutput
+
+
+@final
+class Field(nn.Module):
+    """A radiance field conditioned on source views.
+
+    Args:
+        combinator: H.
+        density: The wiring of the query direction.
+        head: The colour head.
+        activation: From raw values to densities in 1/m.
+        feature_channels: F, of the encoder.
+        encoded_size: Size of the encoded point.
+        num_extras: Further inputs per view.
+        width: D.
+        num_single_view_blocks: Blocks of f1.
+        num_multi_view_blocks: Blocks of f2.
+
+    Source: paper, Overview and Fig. network.
+    """
+
+    def __init__(
+        self,
+        *,
+        combinator: AbstractCombinator,
+        density: AbstractDensity,
+        head: AbstractHead,
+        activation: nn.Module,
+        feature_channels: int,
+        encoded_size: int,
+        num_extras: int,
+        width: int,
+        num_single_view_blocks: int,
+        num_multi_view_blocks: int,
+    ) -> None:
+        super().__init__()
+        self.from_latents = nn.Linear(feature_channels, width)
+        self.single_view = SingleView(
+            width=width, encoded_size=encoded_size, num_extras=num_extras, num_blocks=num_single_view_blocks
+        )
+        self.combinator = combinator
+        self.multi_view = MultiView(width=width, num_blocks=num_multi_view_blocks)
+        self.density = density
+        self.head = head
+        self.activation = activation
+
+    def forward(self, inputs: PointInputs) -> FieldOutput:
+        """Colours (P, 3) and densities (P,) of points as the views see them; latents come through `from_latents`."""
+        trunk = self.density(inputs, self.single_view, self.combinator, self.multi_view)
+        rgb = self.head(trunk.features, trunk.view_features, inputs)
+        return FieldOutput(rgb=rgb, densities=self.activation(trunk.raw_densities))
+
+    def hoist(self, rows: Tensor) -> Tensor:
+        """Apply the linear layer of the features to the maps' rows (N, F) -> (N, D), once instead of at every point.
+
+        Bilinear reading commutes with a linear map (its weights sum to 1, so with the bias too): equal to rounding.
+        """
+        return self.from_latents(rows)

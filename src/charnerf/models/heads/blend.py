@@ -1,0 +1,46 @@
+"""Colour as a blend of the drawings' own colours, plus a gated free colour (beyond the paper)."""
+
+from typing import final
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from charnerf.models.combinators.base import masked_logits
+from charnerf.models.heads.base import AbstractHead
+from charnerf.models.inputs import PointInputs
+
+
+@final
+class BlendHead(AbstractHead):
+    """Softmax over the projected source colours; a gate mixes in a free colour where no drawing shows the point.
+
+    Args:
+        width: D.
+        hidden: Width of the scoring network.
+    """
+
+    def __init__(self, *, width: int, hidden: int) -> None:
+        super().__init__()
+        self.from_views = nn.Linear(width, hidden)
+        self.from_features = nn.Linear(width, hidden, bias=False)
+        self.from_readings = nn.Linear(5, hidden, bias=False)
+        self.score = nn.Linear(hidden, 1)
+        self.free = nn.Linear(width, 4)
+        with torch.no_grad():
+            self.free.bias[3] = -2.0  # the gate starts nearly closed: colours come from the drawings
+
+    def forward(self, features: Tensor, view_features: Tensor, inputs: PointInputs) -> Tensor:
+        """Colours (P, 3)."""
+        cosines = (inputs.view_dirs[:, None] * inputs.source_dirs).sum(-1, keepdim=True)
+        readings = torch.cat((cosines, inputs.visibility[..., None], inputs.source_rgb), dim=-1)
+        hidden = (
+            self.from_views(view_features)
+            + self.from_features(features)[:, None]
+            + self.from_readings(readings)
+        )
+        logits = self.score(F.relu(hidden))[..., 0] + 2.0 * inputs.visibility
+        weights = torch.softmax(masked_logits(logits, inputs.valid), dim=-1)
+        blended = (weights[..., None] * inputs.source_rgb).sum(1)
+        free = self.free(F.relu(features))
+        return blended + torch.sigmoid(free[:, 3:]) * (torch.sigmoid(free[:, :3]) - blended)

@@ -1,0 +1,27 @@
+"""f2 gives the colour, as the paper."""
+
+from typing import final
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from charnerf.models.heads.base import AbstractHead
+from charnerf.models.inputs import PointInputs
+
+
+@final
+class RadianceHead(AbstractHead):
+    """One linear layer and a sigmoid.
+
+    Args:
+        width: D.
+    """
+
+    def __init__(self, *, width: int) -> None:
+        super().__init__()
+        self.rgb = nn.Linear(width, 3)
+
+    def forward(self, features: Tensor, view_features: Tensor, inputs: PointInputs) -> Tensor:
+        """Colours (P, 3) from features (P, D)."""
+        return torch.sigmoid(self.rgb(F.relu(features)))

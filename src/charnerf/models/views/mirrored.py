@@ -1,0 +1,43 @@
+"""The drawings plus the mirrored side view."""
+
+from typing import final
+
+import torch
+
+from charnerf.geometry.cameras import mirror_cameras
+from charnerf.models.views.base import AbstractViews
+from charnerf.types import Cameras, SourceViews
+
+SIDEWAYS = 0.5  # |x| of the viewing axis above which a view counts as seen from a side
+
+
+@final
+class MirroredSide(AbstractViews):
+    """Append each side drawing, flipped, as what the character's other side looks like.
+
+    Most characters are their own mirror image but for details; the appended view is flagged, so that the field can weigh it, and it
+    carves no hull. Views seen from the front or the back gain nothing and are not doubled.
+    """
+
+    def __call__(self, views: SourceViews) -> SourceViews:
+        """Return views (B, V + M) for M views that are seen from a side in any character of the batch."""
+        sideways = views.cameras.world_from_camera[..., 0, 2].abs() > SIDEWAYS
+        columns = (sideways & views.present & ~views.mirrored).any(0).nonzero()[:, 0]
+        if len(columns) == 0:
+            return views
+        side = views[:, columns]
+        flipped = mirror_cameras(side.cameras)
+        cameras = views.cameras
+        return SourceViews(
+            images=torch.cat((views.images, side.images.flip(-1)), dim=1),
+            cameras=Cameras(
+                *(
+                    torch.cat((getattr(cameras, name), getattr(flipped, name)), dim=1)
+                    for name in ("world_from_camera", "focal", "principal_point", "orthographic")
+                ),
+                width=cameras.width,
+                height=cameras.height,
+            ),
+            present=torch.cat((views.present, side.present & sideways[:, columns]), dim=1),
+            mirrored=torch.cat((views.mirrored, torch.ones_like(side.mirrored)), dim=1),
+        )
