@@ -58,8 +58,7 @@ def stratified_t_vals(
     _check_num_samples(num_samples)
     near, far = torch.broadcast_tensors(full_precision(near)[..., None], full_precision(far)[..., None])
     share = equal_shares(near, (*near.shape[:-1], num_samples), generator)
-    t_vals = near * (1.0 - share) + far * share
-    return torch.minimum(torch.maximum(t_vals, near), far)
+    return torch.minimum(near + (far - near) * share, far)  # this form stays ascending under rounding
 
 
 def edges_from_t_vals(t_vals: Tensor, near: Tensor, far: Tensor) -> Tensor:
@@ -162,4 +161,4 @@ def importance_t_vals(
     masses = usable_weights(weights, t_edges.diff(dim=-1)).to(t_edges.dtype)
     bins, share = draw_bins(masses, num_samples, generator)
     lower, upper = t_edges.gather(-1, bins), t_edges.gather(-1, bins + 1)
-    return torch.minimum(torch.maximum(lower * (1.0 - share) + upper * share, lower), upper)
+    return torch.minimum(lower + (upper - lower) * share, upper)
