@@ -1,0 +1,189 @@
+"""From a command line to composed configs: what Hydra refuses becomes one clear message, before any run folder is made."""
+
+import os
+import re
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from hydra import compose, initialize_config_dir
+from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+from hydra._internal.utils import get_args_parser
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
+from omegaconf import DictConfig
+from omegaconf.errors import OmegaConfBaseException
+
+from charnerf.config import validate
+from charnerf.config_checks import nearest
+from charnerf.errors import CharNeRFError, ConfigError
+
+FAILED, WRONG_CALL = 1, 2
+LOOKS_ONLY = ("help", "hydra_help", "version", "cfg", "info", "shell_completion")
+
+
+def compose_config(
+    overrides: Sequence[str] = (), *, conf: Path | None = None, name: str = "train"
+) -> DictConfig:
+    """Compose a config as `train.py` does, and validate it.
+
+    Args:
+        overrides: As on the command line: `combinator=mean`, `scale.width=32`.
+        conf: Folder of the config files; the package's own by default.
+        name: The primary file.
+
+    Raises:
+        ConfigError: Lists everything that is wrong with it.
+    """
+    with _hydra(conf or conf_folder()):
+        cfg = _compose(name, overrides)
+    validate(cfg, trusted_targets=trusted_by(overrides))
+    return cfg
+
+
+def conf_folder() -> Path:
+    """Folder of the config files: inside the installed package, or beside `src` in a checkout."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "conf", here.parents[1] / "conf"):
+        if (folder / "train.yaml").is_file():
+            return folder
+    raise ConfigError(
+        f"{here / 'conf'}: no config files found, expected train.yaml there; install charnerf again."
+    )
+
+
+def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
+    """Compose and validate every job that a command line of `train.py` asks for.
+
+    Raises:
+        ConfigError: Lists what is wrong with the first job that has a problem, and how many others have.
+    """
+    args = get_args_parser().parse_args(list(arguments))
+    if any(getattr(args, name, None) for name in LOOKS_ONLY):
+        return
+    name = (args.config_name or "train").removesuffix(".yaml")
+    folder = Path(args.config_path).resolve() if args.config_path else conf
+    more = [f"hydra.searchpath=[{Path(args.config_dir).resolve().as_uri()}]"] if args.config_dir else []
+    with _hydra(folder):
+        jobs = _jobs(args.overrides) if args.multirun else [list(args.overrides)]
+        broken: list[tuple[list[str], ConfigError]] = []
+        for job in jobs:
+            try:
+                validate(_compose(name, more + job), trusted_targets=trusted_by(job))
+            except ConfigError as error:
+                broken.append((job, error))
+    if not broken:
+        return
+    job, error = broken[0]
+    if not args.multirun:
+        raise error
+    raise ConfigError(
+        f"{len(broken)} of {len(jobs)} jobs can not start, so none was; first `{' '.join(job)}`:\n{error}"
+    ) from error
+
+
+def trusted_by(overrides: Sequence[str]) -> list[str]:
+    """Modules that `trusted_targets=[...]` names on a command line."""
+    for override in _parse(overrides):
+        if override.key_or_group == "trusted_targets" and isinstance(override.value(), list):
+            return [str(one) for one in override.value()]  # type: ignore[union-attr]
+    return []
+
+
+def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: Path) -> int:
+    """Run an entry point of Hydra: checks its command line first, and tells errors in one message.
+
+    Returns:
+        Exit status: 0 done, 1 failed, 2 wrong call.
+    """
+    debug = os.environ.get("HYDRA_FULL_ERROR") == "1"
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra hands errors on instead of printing them
+    try:
+        check_command_line(arguments, conf=conf)
+        function()
+    except (CharNeRFError, HydraException, OmegaConfBaseException, OSError, MemoryError) as error:
+        if debug:
+            traceback.print_exc()
+        print(f"error: {error}", file=sys.stderr)
+        return (
+            FAILED if isinstance(error, CharNeRFError | OSError) and not is_wrong_call(error) else WRONG_CALL
+        )
+    except KeyboardInterrupt:
+        print("stopped.", file=sys.stderr)
+        return FAILED
+    return 0
+
+
+def is_wrong_call(error: BaseException) -> bool:
+    """Whether an error is about what was typed."""
+    return isinstance(error, ConfigError | HydraException | OmegaConfBaseException)
+
+
+@contextmanager
+def _hydra(conf: Path) -> Iterator[None]:
+    """Hydra's global state, set up for a folder of config files and cleared again."""
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf), version_base="1.3", job_name="train"):
+        yield
+
+
+def _parse(overrides: Sequence[str]) -> list[Override]:
+    loader = GlobalHydra.instance().config_loader() if GlobalHydra.instance().is_initialized() else None
+    try:
+        return OverridesParser.create(config_loader=loader).parse_overrides(list(overrides))  # type: ignore[arg-type]
+    except HydraException as error:
+        first = str(error).splitlines()[0]
+        raise ConfigError(f"{' '.join(overrides)}: can not be read ({first}), expected key=value.") from error
+
+
+def _jobs(overrides: Sequence[str]) -> list[list[str]]:
+    """The overrides of every job of a sweep."""
+    try:
+        return [job for batch in BasicSweeper.split_arguments(_parse(overrides), None) for job in batch]
+    except HydraException as error:
+        raise ConfigError(f"{' '.join(overrides)}: {error}") from error
+
+
+def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
+    """Compose; a key that Hydra does not know is let in, so that `validate` names it beside all other problems."""
+    accepted = [one.input_line or "" for one in _parse(overrides)]
+    for _ in range(len(accepted) + 1):
+        try:
+            return compose(name, overrides=accepted)
+        except MissingConfigException as error:
+            raise ConfigError(_about_missing_option(error)) from error
+        except ConfigCompositionException as error:
+            unknown = re.match(r"Could not override '([^']+)'", str(error))
+            index = next(
+                (i for i, one in enumerate(accepted) if unknown and one.startswith(f"{unknown[1]}=")), None
+            )
+            if index is None or unknown is None or unknown[1].startswith("hydra."):
+                raise ConfigError(_about_composition(error)) from error
+            if "/" in unknown[1]:
+                groups = GlobalHydra.instance().config_loader().list_groups("")
+                raise ConfigError(f"{unknown[1]}: unknown group; {nearest(unknown[1], groups)}") from error
+            accepted[index] = f"++{accepted[index]}"
+        except (HydraException, OmegaConfBaseException) as error:
+            raise ConfigError(_about_composition(error)) from error
+    raise ConfigError(f"{' '.join(overrides)}: can not be composed; check each key=value.")
+
+
+def _about_missing_option(error: MissingConfigException) -> str:
+    group, _, option = (error.missing_cfg_file or "").rpartition("/")
+    if not group:
+        return f"--config-name: found no file {error.missing_cfg_file}.yaml among the config files; leave it out for `train`."
+    options = list(error.options or GlobalHydra.instance().config_loader().get_group_options(group))
+    listed = ", ".join(sorted(options))
+    close = nearest(option, options)
+    return f"{group}: found no option '{option}', expected one of: {listed}.{' D' + close[1:] if close.startswith('did') else ''}"
+
+
+def _about_composition(error: BaseException) -> str:
+    lines = [line for line in str(error).splitlines() if line.strip()]
+    if error.__cause__ is not None:
+        lines += str(error.__cause__).splitlines()[:1]
+    return " ".join(lines[:3])
