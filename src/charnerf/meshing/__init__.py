@@ -1,0 +1,1 @@
+"""Fields to meshes: density grid, level, surface, colours, files."""
