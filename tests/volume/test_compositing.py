@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from charnerf.errors import ShapeError
 from charnerf.volume.compositing import (
+    absorbed_share,
     alphas_from_densities,
     composite,
     depth_over_background,
@@ -164,3 +165,11 @@ def test_gradcheck():
     assert torch.autograd.gradcheck(composite, (weights, values, background))
     assert torch.autograd.gradcheck(expected_depth, (weights, t_vals, far))
     assert torch.autograd.gradcheck(depth_over_background, (weights, t_vals, far))
+
+
+def test_gradient_of_alpha_lives_until_the_exponential_underflows():
+    """expm1's own derivative is 0 from a product of 17 on in float32."""
+    products = torch.logspace(-20, 1.93, 60, dtype=torch.float64).float().requires_grad_()
+    absorbed_share(products).sum().backward()
+    exact = torch.exp(-products.detach().double())
+    assert ((products.grad.double() - exact).abs() / exact).max() < 1e-5

@@ -1,9 +1,9 @@
 """Volume rendering as pure functions: from densities along a ray to what is seen.
 
 Optical depth tau_i = density_i * delta_i. Transmittance is the exponential of a negative sum, never a
-product of (1 - alpha), and alpha is -expm1(-tau), never 1 - exp(-tau): so thin media keep all their digits,
-opaque ones a finite gradient, and the weights and the final transmittance sum to 1 to rounding for any tau
-in [0, inf). Half precisions are computed and returned in float32.
+product of (1 - alpha), and alpha of a thin interval is -expm1(-tau), never 1 - exp(-tau): so thin media keep
+all their digits, opaque ones a finite gradient, and the weights and the final transmittance sum to 1 to
+rounding for any tau in [0, inf). Half precisions are computed and returned in float32.
 """
 
 import torch
@@ -34,7 +34,17 @@ def alphas_from_densities(densities: Tensor, deltas: Tensor) -> Tensor:
     tensor([1.0000e-20, 6.3212e-01, 1.0000e+00])
     """
     check_same_shape("densities", densities, "deltas", deltas)
-    return -torch.expm1(-(full_precision(densities) * full_precision(deltas)))
+    return absorbed_share(full_precision(densities) * full_precision(deltas))
+
+
+def absorbed_share(optical_depths: Tensor) -> Tensor:
+    """1 - exp(-tau) of optical depths tau (...), with all digits in value and gradient.
+
+    expm1 alone would do for the value; its derivative is computed as result + 1, which is 0 in float32 from
+    tau = 17 on, where the true one, exp(-tau), is a number up to tau = 87.
+    """
+    thin = -torch.expm1(-optical_depths.clamp_max(0.5))
+    return torch.where(optical_depths < 0.5, thin, 1.0 - torch.exp(-optical_depths))
 
 
 def optical_depths_before(optical_depths: Tensor) -> tuple[Tensor, Tensor]:
@@ -70,7 +80,7 @@ def weights_from_optical_depths(optical_depths: Tensor) -> tuple[Tensor, Tensor]
     """Weights (..., S) and final transmittance (...) of intervals of given optical depths (..., S), >= 0."""
     optical_depths = full_precision(optical_depths)
     before, total = optical_depths_before(optical_depths)
-    return torch.exp(-before) * -torch.expm1(-optical_depths), torch.exp(-total)
+    return torch.exp(-before) * absorbed_share(optical_depths), torch.exp(-total)
 
 
 def weights_from_densities(densities: Tensor, deltas: Tensor) -> tuple[Tensor, Tensor]:
