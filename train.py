@@ -14,8 +14,8 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig
 
-from charnerf.composition import run_door, trusted_by
 from charnerf.config import validate
+from charnerf.config.composition import run_door, trusted_by
 
 CONF = Path(__file__).resolve().parent / "conf"
 sweep_folders: list[Path] = []

@@ -1,15 +1,11 @@
 """The library's two objects: a loaded `Model`, and a `Hero`, one character encoded from its drawings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
-import numpy as np
 import torch
 
-from charnerf.errors import ConfigError
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.types import Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer

@@ -33,8 +33,8 @@ def build_part(section: DictConfig, given: Mapping[str, Any] | None = None) -> A
 
     Args:
         section: Validated before.
-        given: Arguments that the config does not hold, because another part decides them; those that the class does not take
-            (the mean has no width) are left out.
+        given: Arguments that the config does not hold, because another part decides them; those that the
+            class does not take (the mean has no width) are left out.
     """
     taken = inspect.signature(get_object(section._target_)).parameters
     return instantiate(
@@ -43,7 +43,7 @@ def build_part(section: DictConfig, given: Mapping[str, Any] | None = None) -> A
 
 
 def build_model(cfg: DictConfig) -> CharNeRF:
-    """Build the model of a validated config, untrained. A fine field is built only where the renderer has a fine pass."""
+    """Build the untrained model of a validated config; a fine field only where there is a fine pass."""
     encoder = build_part(cfg.encoder, {"in_channels": IMAGE_CHANNELS})
     features = build_part(cfg.features)
     settings = cfg.model
@@ -86,8 +86,8 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
 
     Args:
         path: A run folder, a .ckpt below one, a .safetensors; the released weights if None.
-        trusted_targets: Modules of your own classes that the run's config may name. Only name what you trust: building a part
-            runs its code.
+        trusted_targets: Modules of your own classes that the run's config may name. Only name what you trust:
+            building a part runs its code.
 
     Raises:
         DataError: If there are no weights, or they do not fit their config.
@@ -96,8 +96,8 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
     file = RELEASED if path is None else Path(path)
     if path is None and not file.is_file():
         raise DataError(
-            f"{file}: this installation holds no released weights, expected them there; name a run folder, a .ckpt or a "
-            ".safetensors instead, or make one with `python train.py`."
+            f"{file}: this installation holds no released weights, expected them there; name a run folder, a"
+            " .ckpt or a .safetensors instead, or make one with `python train.py`."
         )
     if not file.exists():
         raise DataError(f"{file}: does not exist, expected a run folder, a .ckpt or a .safetensors.")
@@ -191,7 +191,8 @@ def _weights_of_run(folder: Path) -> Path:
             return file
     listed = ", ".join(str(file.relative_to(folder)) for file in candidates)
     raise DataError(
-        f"{folder}: holds no weights, expected one of {listed}; is it the folder of a run that got to its end?"
+        f"{folder}: holds no weights, expected one of {listed}; is it the folder of a run that got to its"
+        " end?"
     )
 
 
@@ -199,7 +200,7 @@ def _read_safetensors(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
     try:
         with safe_open(str(file), framework="pt") as opened:
             metadata = opened.metadata() or {}
-            state = {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118 (not a dict)
+            state = {name: opened.get_tensor(name) for name in opened.keys()}
     except (SafetensorError, OSError) as error:
         raise DataError(
             f"{file}: can not be read as safetensors ({error}), expected a file that charnerf wrote."
@@ -224,12 +225,14 @@ def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
         state = content["state_dict"]
     except Exception as error:  # torch raises many kinds on files that are no checkpoints
         raise DataError(
-            f"{file}: can not be read as a checkpoint ({' '.join(str(error).split())[:200]}), expected one that a run wrote."
+            f"{file}: can not be read as a checkpoint ({' '.join(str(error).split())[:200]}), expected one"
+            " that a run wrote."
         ) from error
     folder = next((one for one in (file.parent, file.parent.parent) if (one / "config.yaml").is_file()), None)
     if folder is None:
         raise DataError(
-            f"{file}: no config.yaml beside it or in {file.parent.parent}; keep checkpoints in their run folder."
+            f"{file}: no config.yaml beside it or in {file.parent.parent}; keep checkpoints in their run"
+            " folder."
         )
     prefix = "model."
     return load_config(folder), {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}

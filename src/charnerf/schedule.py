@@ -1,12 +1,14 @@
 """How many rays and surface points a training step takes, and when that changes; pure arithmetic, no state.
 
-A phase lasts until a share of the run, a number of steps or a number of training seconds. Steps are counted from 0, so that
-`until: {steps: 100}` makes steps 0 to 99 and leaves step 100 to the next phase, also after a resume.
+A phase lasts until a share of the run, a number of steps or a number of training seconds. Steps are counted
+from 0, so that `until: {steps: 100}` makes steps 0 to 99 and leaves step 100 to the next phase, also after a
+resume.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import final
 
 from charnerf.errors import ConfigError
@@ -39,10 +41,15 @@ class Phase:
         if self.until is None:
             return
         if len(self.until) != 1 or not set(self.until) <= set(UNITS):
-            raise ConfigError(f"until: found {dict(self.until)}, expected one of {{share: ..}}, {{steps: ..}}, {{seconds: ..}}.")
+            raise ConfigError(
+                f"until: found {dict(self.until)}, expected one of {{share: ..}}, {{steps: ..}}, {{seconds:"
+                " ..}."
+            )
         unit, end = next(iter(self.until.items()))
         if not (0 < end < math.inf) or (unit == "share" and end >= 1):
-            raise ConfigError(f"until.{unit}: found {end}, expected above 0{' and below 1' if unit == 'share' else ''}.")
+            raise ConfigError(
+                f"until.{unit}: found {end}, expected above 0{' and below 1' if unit == 'share' else ''}."
+            )
 
     def is_over(self, *, step: int, seconds: float, progress: float) -> bool:
         """Whether the phase has ended before this step."""
@@ -62,8 +69,8 @@ class PhaseSchedule:
     Raises:
         ConfigError: If they do not.
 
-    Source: paper, section "Mix of 2d ray sampling and 3d surface sampling" (1000 rays and 3000 points for four days, then 10000
-    and 10000 for three).
+    Source: paper, section "Mix of 2d ray sampling and 3d surface sampling" (1000 rays and 3000 points for
+    four days, then 10000 and 10000 for three).
     """
 
     def __init__(self, *, phases: Sequence[Phase]) -> None:
@@ -71,15 +78,17 @@ class PhaseSchedule:
             raise ConfigError("schedule.phases: found none, expected at least one phase.")
         for index, phase in enumerate(phases[:-1]):
             if phase.until is None:
-                raise ConfigError(f"schedule.phases.{index}.until: not set, expected an end: only the last phase is open.")
+                raise ConfigError(
+                    f"schedule.phases.{index}.until: not set, expected an end: only the last phase is open."
+                )
         if phases[-1].until is not None:
             raise ConfigError(
-                f"schedule.phases.{len(phases) - 1}.until: found {dict(phases[-1].until)}, expected none: the last phase "
-                "lasts until the budget ends."
+                f"schedule.phases.{len(phases) - 1}.until: found {dict(phases[-1].until)}, expected none: the"
+                " last phase lasts until the budget ends."
             )
         for unit in UNITS:
             ends = [phase.until[unit] for phase in phases if phase.until is not None and unit in phase.until]
-            if any(later <= earlier for earlier, later in zip(ends, ends[1:], strict=False)):
+            if any(later <= earlier for earlier, later in pairwise(ends)):
                 raise ConfigError(f"schedule.phases: found ends {ends} in {unit}, expected them to ascend.")
         self.phases = tuple(phases)
 
@@ -99,7 +108,8 @@ class PhaseSchedule:
 
         Args:
             step: Steps done before this one.
-            seconds: Training seconds before this step, of all its resumed parts together, evaluation excluded.
+            seconds: Training seconds before this step, of all its resumed parts together, evaluation
+                excluded.
             progress: Share of the budget that is used up before this step, in [0, 1].
 
         Returns:
@@ -108,8 +118,10 @@ class PhaseSchedule:
         return self.phases[self.index_at(step=step, seconds=seconds, progress=progress)]
 
 
-def progress_of_run(*, step: int, seconds: float, budget_steps: int | None, budget_seconds: float | None) -> float:
-    """Share of the budget that is used up, in [0, 1]: of steps or of seconds, whichever is larger; 0 without a budget."""
+def progress_of_run(
+    *, step: int, seconds: float, budget_steps: int | None, budget_seconds: float | None
+) -> float:
+    """Share of the budget used up, in [0, 1]: of steps or of seconds, whichever is larger; 0 without one."""
     shares = [0.0]
     if budget_steps is not None:
         shares.append(step / budget_steps)

@@ -1,4 +1,4 @@
-"""From a command line to composed configs: what Hydra refuses becomes one clear message, before any run folder is made."""
+"""From a command line to composed configs; what Hydra refuses becomes one clear message, before any work."""
 
 import os
 import re
@@ -18,8 +18,8 @@ from hydra.errors import ConfigCompositionException, HydraException, MissingConf
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from charnerf.config import validate
-from charnerf.config_checks import nearest
+from charnerf.config.hints import nearest
+from charnerf.config.validation import validate
 from charnerf.errors import CharNeRFError, ConfigError
 
 FAILED, WRONG_CALL = 1, 2
@@ -47,7 +47,7 @@ def compose_config(
 
 def conf_folder() -> Path:
     """Folder of the config files: inside the installed package, or beside `src` in a checkout."""
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     for folder in (here / "conf", here.parents[1] / "conf"):
         if (folder / "train.yaml").is_file():
             return folder
@@ -108,12 +108,12 @@ def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: 
     except (CharNeRFError, HydraException, OmegaConfBaseException, OSError, MemoryError) as error:
         if debug:
             traceback.print_exc()
-        print(f"error: {error}", file=sys.stderr)
+        sys.stderr.write(f"error: {error}\n")
         return (
             FAILED if isinstance(error, CharNeRFError | OSError) and not is_wrong_call(error) else WRONG_CALL
         )
     except KeyboardInterrupt:
-        print("stopped.", file=sys.stderr)
+        sys.stderr.write("stopped.\n")
         return FAILED
     return 0
 
@@ -149,7 +149,7 @@ def _jobs(overrides: Sequence[str]) -> list[list[str]]:
 
 
 def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
-    """Compose; a key that Hydra does not know is let in, so that `validate` names it beside all other problems."""
+    """Compose; a key that Hydra does not know is let in: `validate` names it beside all other problems."""
     accepted = [one.input_line or "" for one in _parse(overrides)]
     for _ in range(len(accepted) + 1):
         try:
@@ -175,11 +175,17 @@ def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
 def _about_missing_option(error: MissingConfigException) -> str:
     group, _, option = (error.missing_cfg_file or "").rpartition("/")
     if not group:
-        return f"--config-name: found no file {error.missing_cfg_file}.yaml among the config files; leave it out for `train`."
+        return (
+            f"--config-name: found no file {error.missing_cfg_file}.yaml among the config files; leave it out"
+            " for `train`."
+        )
     options = list(error.options or GlobalHydra.instance().config_loader().get_group_options(group))
     listed = ", ".join(sorted(options))
     close = nearest(option, options)
-    return f"{group}: found no option '{option}', expected one of: {listed}.{' D' + close[1:] if close.startswith('did') else ''}"
+    return (
+        f"{group}: found no option '{option}', expected one of:"
+        f" {listed}.{' D' + close[1:] if close.startswith('did') else ''}"
+    )
 
 
 def _about_composition(error: BaseException) -> str:

@@ -1,0 +1,80 @@
+"""What no single value of a config can show: combinations that can not work."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from charnerf.config.problems import Problems, join
+from charnerf.errors import ConfigError
+from charnerf.schedule import Phase, PhaseSchedule
+
+Rule = Callable[..., Iterator[tuple[str, str]]]
+
+
+def _heads_divide_width(heads: int, width: int) -> Iterator[tuple[str, str]]:
+    if heads < 1 or width % heads:
+        yield "combinator.num_heads", f"found {heads}, expected a divisor of scale.width = {width}."
+
+
+def _something_ends_the_run(steps: int | None, seconds: float | None) -> Iterator[tuple[str, str]]:
+    if steps is None and seconds is None:
+        yield (
+            "budget.steps",
+            "found null, and budget.seconds null too; set one of them, or the run never ends.",
+        )
+
+
+def _phases_are_a_schedule(phases: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    built: list[Phase] = []
+    for index, phase in enumerate(phases):
+        try:
+            built.append(Phase(**{name: value for name, value in phase.items() if name != "_target_"}))
+        except ConfigError as error:
+            where, message = str(error).split(": ", maxsplit=1)
+            yield f"schedule.phases.{index}.{where}", message
+            return
+    try:
+        PhaseSchedule(phases=built)
+    except ConfigError as error:
+        where, message = str(error).split(": ", maxsplit=1)
+        yield where, message
+
+
+def _some_term_counts(weights: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    if not any(weight > 0 for weight in weights.values()):
+        yield "loss.weights", f"found {dict(weights)}, expected at least one weight above 0."
+    for term, weight in weights.items():
+        if weight < 0:
+            yield f"loss.weights.{term}", f"found {weight}, expected 0 or more."
+
+
+def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
+    def rule(value: Any) -> Iterator[tuple[str, str]]:
+        if isinstance(value, int | float) and value < 1:
+            yield key, f"found {value}, expected at least 1."
+
+    return (key,), rule
+
+
+RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
+    (("combinator.num_heads", "scale.width"), _heads_divide_width),
+    (("budget.steps", "budget.seconds"), _something_ends_the_run),
+    (("schedule.phases",), _phases_are_a_schedule),
+    (("loss.weights",), _some_term_counts),
+    _at_least_one("data.views"),
+    _at_least_one("data.train"),
+    _at_least_one("data.val"),
+    _at_least_one("data.test"),
+)
+
+
+def check_ranges(plain: Any, key: str, problems: Problems) -> None:
+    """Find every section with `near` and `far` whose near is not below its far."""
+    if isinstance(plain, list):
+        plain = dict(enumerate(plain))
+    if not isinstance(plain, Mapping):
+        return
+    near, far = plain.get("near"), plain.get("far")
+    if isinstance(near, int | float) and isinstance(far, int | float) and not near < far:
+        problems.add(join(key, "near"), f"found {near}, expected below {join(key, 'far')} = {far}.")
+    for name, value in plain.items():
+        check_ranges(value, join(key, name), problems)

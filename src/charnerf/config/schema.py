@@ -1,0 +1,95 @@
+"""The sections of a config. A group is a part; its schema is the signature of the class that it names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from charnerf.config.hints import Above, AtLeast, Part
+
+Count = Annotated[int, AtLeast(1)]
+CountOrZero = Annotated[int, AtLeast(0)]
+
+
+def _part(*homes: str, given: Sequence[str] = ()) -> Any:
+    return Annotated[Any, Part(homes=homes, given=frozenset(given))]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Sizes of pictures, networks and runs; the other sections read them by interpolation."""
+
+    image_size: Annotated[int, AtLeast(8)]
+    feature_dim: Count
+    coarse_stacks: Count
+    fine_stacks: Count
+    hourglass_depth: Count
+    width: Count
+    num_single_view_blocks: CountOrZero
+    num_multi_view_blocks: CountOrZero
+    num_coarse: Count
+    num_fine: CountOrZero
+    phase_rays: list[Count]
+    phase_surface_points: list[CountOrZero]
+    batch_characters: Count
+    steps: Count | None
+    seconds: Annotated[float, Above(0)] | None
+    eval_views: Count | None
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What ends a run, whichever comes first; training time excludes evaluation."""
+
+    steps: Count | None
+    seconds: Annotated[float, Above(0)] | None
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """Settings of the model as a whole."""
+
+    hull: bool
+    num_frequencies: Count
+    box_centre: list[float]
+    box_half_extent: Annotated[float, Above(0)]
+    activation: _part("charnerf.models.activations")  # type: ignore[valid-type]
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """The sections of a run, as `conf/train.yaml` composes them."""
+
+    name: str
+    seed: CountOrZero
+    ckpt_path: str | None
+    trusted_targets: list[str]
+    model: ModelSettings
+    scale: Scale
+    budget: Budget
+    encoder: _part("charnerf.models.encoders", given=["in_channels"])  # type: ignore[valid-type]
+    combinator: _part("charnerf.models.combinators", given=["width"])  # type: ignore[valid-type]
+    head: _part("charnerf.models.heads", given=["width"])  # type: ignore[valid-type]
+    density: _part("charnerf.models.density", given=["width"])  # type: ignore[valid-type]
+    views: _part("charnerf.models.views")  # type: ignore[valid-type]
+    features: _part("charnerf.models.features")  # type: ignore[valid-type]
+    quadrature: _part("charnerf.volume.quadrature")  # type: ignore[valid-type]
+    renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
+    loss: _part("charnerf.losses")  # type: ignore[valid-type]
+    schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
+    data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
+    optimizer: _part("torch.optim", given=["params"])  # type: ignore[valid-type]
+    trainer: _part("lightning")  # type: ignore[valid-type]
+
+
+MODEL_SECTIONS = (
+    "scale",
+    "model",
+    "encoder",
+    "combinator",
+    "head",
+    "density",
+    "views",
+    "features",
+    "quadrature",
+    "renderer",
+)

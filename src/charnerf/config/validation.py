@@ -1,0 +1,86 @@
+"""Reports everything that is wrong with a config, in one error, before any work."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import make_dataclass
+from typing import Any, get_type_hints
+
+from omegaconf import DictConfig, ListConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from charnerf.config.checks import BROKEN, MISSING, check_section
+from charnerf.config.problems import Problems, join
+from charnerf.config.rules import RULES, check_ranges
+from charnerf.config.schema import MODEL_SECTIONS, RunConfig
+from charnerf.errors import ConfigError
+
+
+def validate(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
+    """Check a composed config whole, before anything is built from it.
+
+    Args:
+        cfg: The config, with or without its interpolations resolved.
+        trusted_targets: Modules whose classes `_target_` may name besides charnerf's own, as the user typed
+            them. Never take them from the config itself: it may have come with a run folder from elsewhere.
+
+    Raises:
+        ConfigError: Lists every problem, each with its full key.
+    """
+    _validate_against(RunConfig, cfg, trusted_targets)
+
+
+def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
+    """Check, as `validate` does, what the model needs of a config that came with weights."""
+    hints = get_type_hints(RunConfig, include_extras=True)
+    schema = make_dataclass("ModelConfig", [(name, hints[name]) for name in MODEL_SECTIONS], frozen=True)
+    chosen = OmegaConf.masked_copy(cfg, [name for name in MODEL_SECTIONS if name in cfg])
+    _validate_against(schema, chosen, trusted_targets)
+
+
+def _validate_against(schema: type, cfg: DictConfig, trusted_targets: Sequence[str]) -> None:
+    problems = Problems(trusted=tuple(trusted_targets))
+    plain = to_plain(cfg, "", problems)
+    check_section(schema, plain, "", problems)
+    for keys, rule in RULES:
+        values = [look_up(plain, key) for key in keys]
+        if not any(value is BROKEN or problems.touch(key) for key, value in zip(keys, values, strict=True)):
+            for key, message in rule(*values):
+                problems.add(key, message)
+    check_ranges(plain, "", problems)
+    if problems.found:
+        raise ConfigError(as_message(problems.lines()))
+
+
+def as_message(lines: Sequence[str]) -> str:
+    """One message for a list of problems."""
+    if len(lines) == 1:
+        return lines[0]
+    return "\n".join([f"The config has {len(lines)} problems:", *(f"  {line}" for line in lines)])
+
+
+def to_plain(node: Any, key: str, problems: Problems) -> Any:
+    """Resolve a config into dicts, lists and values; what can not be read becomes a problem."""
+    if isinstance(node, DictConfig):
+        names: Sequence[Any] = list(node.keys())
+    elif isinstance(node, ListConfig):
+        names = range(len(node))
+    else:
+        return node
+    values = {}
+    for name in names:
+        try:
+            missing = OmegaConf.is_missing(node, name)
+            values[name] = MISSING if missing else to_plain(node[name], join(key, name), problems)
+        except OmegaConfBaseException as error:
+            first_line = str(error).splitlines()[0]
+            problems.add(join(key, name), f"can not be read: {first_line}; correct what it refers to.")
+            values[name] = BROKEN
+    return list(values.values()) if isinstance(node, ListConfig) else values
+
+
+def look_up(plain: Any, key: str) -> Any:
+    """Value at a full key, BROKEN where there is none."""
+    for name in key.split("."):
+        if not isinstance(plain, Mapping) or name not in plain:
+            return BROKEN
+        plain = plain[name]
+    return plain
