@@ -1,0 +1,1 @@
+"""From meshes to data sets: loading, pictures by Embree, embedded characters."""

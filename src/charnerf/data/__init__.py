@@ -1,0 +1,1 @@
+"""Data sets: the layout on disk, characters, surface points, batches."""
