@@ -1,0 +1,182 @@
+"""Meshes to characters of a data set, in parallel processes; each is written aside and renamed."""
+
+import multiprocessing
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import trimesh
+from tqdm import tqdm
+
+from charnerf.capture.embree import CaptureOptions, capture_character
+from charnerf.capture.meshes import SUFFIXES, axes_rotation, load_scene
+from charnerf.data.characters import remove_partial_characters, write_character
+from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
+from charnerf.data.mesh_files import write_surface_mesh
+from charnerf.errors import CharNeRFError, DataError
+
+
+@dataclass(frozen=True)
+class CaptureReport:
+    """What a capture did.
+
+    Attributes:
+        captured: Names of the characters that are in the data set now, in the order given.
+        failed: One message for each mesh that could not be captured.
+    """
+
+    captured: tuple[str, ...]
+    failed: tuple[str, ...]
+
+
+def capture_dataset(
+    mesh_paths: Sequence[str | Path],
+    root: str | Path,
+    split: str,
+    *,
+    options: CaptureOptions | None = None,
+    up: str | None = None,
+    facing: str | None = None,
+    processes: int | None = None,
+) -> CaptureReport:
+    """Capture meshes into one split of a data set, new or already there.
+
+    Args:
+        mesh_paths: Mesh files, and folders of them (not deeper); a character's name is its file's stem.
+        root: Folder of the data set.
+        split: Split that gets the characters.
+        options: How they are captured.
+        up: Axis that points up in all files; None for each format's own.
+        facing: Signed axis that the characters face; None for each format's own.
+        processes: Worker processes; None for one a core.
+
+    Returns:
+        What was captured, and what failed: a bad mesh does not stop the others.
+
+    Raises:
+        DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set.
+    """
+    options = options or CaptureOptions()
+    files = expand_mesh_paths(mesh_paths)
+    root = Path(root)
+    check_name("split", split)
+    if up is not None and facing is not None:
+        axes_rotation(up, facing)
+    refuse_taken_names(open_or_new(root), [file.stem for file in files])
+    root.mkdir(parents=True, exist_ok=True)
+    remove_partial_characters(root)
+    work = partial(_capture_file, root=root, options=options, up=up, facing=facing)
+    messages: dict[Path, str | None] = {}
+    with tqdm(total=len(files), desc="capture", unit="character", dynamic_ncols=True) as bar:
+        for file, message in _run(work, files, processes):
+            messages[file] = message
+            if message is None:
+                add_to_split(root, split, [file.stem], made_by=made_by(options))
+            else:
+                bar.write(f"not captured: {message}")
+            bar.update()
+    return CaptureReport(
+        captured=tuple(file.stem for file in files if messages[file] is None),
+        failed=tuple(message for file in files if (message := messages[file]) is not None),
+    )
+
+
+def capture_scene_to(
+    root: str | Path, name: str, scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOptions
+) -> Path:
+    """Capture one scene that stands in the world frame; dataset.json is left to `layout.add_to_split`.
+
+    Args:
+        root: Folder of the data set; made if missing.
+        name: The character's name.
+        scene: World frame.
+        options: How.
+
+    Returns:
+        The character's folder.
+
+    Raises:
+        DataError: If the name is taken or the scene has no triangles.
+    """
+    captured = capture_character(scene, options)
+    return write_character(
+        root, name, captured.pictures, write_mesh=partial(write_surface_mesh, mesh=captured.surface)
+    )
+
+
+def made_by(options: CaptureOptions) -> dict[str, Any]:
+    """Facts for dataset.json about how characters were captured."""
+    return {
+        "program": f"charnerf {version('charnerf')}",
+        "views": options.views,
+        "size": options.size,
+        "sources": options.sources,
+        "light": type(options.light).__name__,
+        "depth": options.depth,
+    }
+
+
+def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
+    """Mesh files, folders replaced by the mesh files in them, sorted.
+
+    Raises:
+        DataError: If a path is missing, a folder holds no mesh, or nothing was given.
+    """
+    files: list[Path] = []
+    for path in map(Path, mesh_paths):
+        if path.is_dir():
+            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+            if not inside:
+                raise DataError(
+                    f"{path}: found no mesh in this folder, expected {', '.join(SUFFIXES)} files."
+                )
+            files += inside
+        elif path.exists():
+            files.append(path)
+        else:
+            raise DataError(f"{path}: no such file or folder, expected a mesh or a folder of them.")
+    if not files:
+        raise DataError("meshes: found none, expected at least one file or folder.")
+    return files
+
+
+def _run(
+    work: partial[str | None], files: Sequence[Path], processes: int | None
+) -> Iterator[tuple[Path, str | None]]:
+    """Each file with its message as it ends; processes begin afresh and inherit no thread's lock."""
+    count = min(processes or os.cpu_count() or 1, len(files))
+    if count <= 1:
+        for file in files:
+            yield file, work(file)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_one_thread) as pool:
+        waiting = {pool.submit(work, file): file for file in files}
+        try:
+            for done in as_completed(waiting):
+                yield waiting[done], done.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _one_thread() -> None:
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def _capture_file(
+    file: Path, *, root: Path, options: CaptureOptions, up: str | None, facing: str | None
+) -> str | None:
+    """Capture a file; the message of what is wrong with it, or None."""
+    try:
+        capture_scene_to(root, file.stem, load_scene(file, up, facing), options)
+    except CharNeRFError as err:
+        return str(err)
+    return None

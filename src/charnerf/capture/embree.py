@@ -1,0 +1,244 @@
+"""Pictures of a scene by Embree rays: RGBA, antialiased, texture-filtered, unlit by default."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import torch
+import trimesh
+from scipy import ndimage
+
+from charnerf.capture.lights import AbstractLight, Unlit
+from charnerf.data.characters import SOURCE_ORDER, CharacterPictures
+from charnerf.data.color import srgb_from_linear
+from charnerf.data.raycast import Hits, RayCaster
+from charnerf.data.scene_mesh import surface_of_scene
+from charnerf.data.surface_mesh import SurfaceMesh, shade, texture_levels, triangle_normals
+from charnerf.geometry.cameras import (
+    cameras_towards,
+    direction_from_angles,
+    fibonacci_hemisphere,
+    pixel_rays,
+    project,
+)
+from charnerf.types import Cameras
+
+CENTRE = (0.0, 0.0, 1.0)
+SOURCE_AZIMUTHS = {"front": 0.0, "side": 90.0, "back": 180.0}
+
+
+@dataclass(frozen=True)
+class CaptureOptions:
+    """How a character is captured.
+
+    Attributes:
+        views: Target pictures, on a Fibonacci lattice of the upper hemisphere.
+        size: Side of every picture, pixels.
+        sources: Projection of the source views.
+        depth: Whether to keep depth pictures.
+        light: How the surface is lit.
+        subsamples: Rays a pixel, squared: 3 means 9.
+        edge_subsamples: The same for pixels that the silhouette crosses.
+    """
+
+    views: int = 48
+    size: int = 128
+    sources: Literal["orthographic", "pinhole"] = "orthographic"
+    depth: bool = False
+    light: AbstractLight = field(default_factory=Unlit)
+    subsamples: int = 3
+    edge_subsamples: int = 6
+
+
+@dataclass(frozen=True)
+class CapturedCharacter:
+    """Pictures and cameras of a character, and the surface that they were taken of."""
+
+    pictures: CharacterPictures
+    surface: SurfaceMesh
+
+
+def capture_character(scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOptions) -> CapturedCharacter:
+    """Take all pictures of a scene that stands in the world frame.
+
+    Args:
+        scene: World frame, from `meshes.load_scene` or a generator.
+        options: How.
+
+    Returns:
+        Pictures with their cameras: pinhole targets, and the source views front, side, back.
+
+    Raises:
+        DataError: If the scene has no triangles.
+    """
+    surface = surface_of_scene(scene)
+    targets, sources = framing_cameras(surface, options)
+    studio = _Studio(surface, options)
+    shots = [studio.shoot(targets[index]) for index in range(options.views)]
+    source_shots = [studio.shoot(sources[index]) for index in range(len(SOURCE_ORDER))]
+    pictures = CharacterPictures(
+        cameras=targets,
+        images=np.stack([shot.rgba for shot in shots]),
+        source_cameras=sources,
+        source_images=np.stack([shot.rgba for shot in source_shots]),
+        source_names=SOURCE_ORDER,
+        depths=np.stack([shot.depth for shot in shots]) if options.depth else None,
+    )
+    return CapturedCharacter(pictures=pictures, surface=surface)
+
+
+def framing_cameras(surface: SurfaceMesh, options: CaptureOptions) -> tuple[Cameras, Cameras]:
+    """Target cameras (views,) and source cameras (3,) that frame the whole surface."""
+    centre = torch.tensor(CENTRE, dtype=torch.float64)
+    reach = float(np.linalg.norm(surface.triangles.reshape(-1, 3) - np.array(CENTRE), axis=-1).max())
+    half_extent = max(1.0, 1.05 * reach)
+    distance = max(4.0, 2.5 * half_extent)
+    azimuths = torch.tensor([SOURCE_AZIMUTHS[name] for name in SOURCE_ORDER], dtype=torch.float64)
+    towards_sources = direction_from_angles(azimuths, torch.zeros_like(azimuths))
+    targets = cameras_towards(
+        fibonacci_hemisphere(options.views),
+        target=centre,
+        distance=distance,
+        half_extent=half_extent,
+        size=options.size,
+        orthographic=False,
+    )
+    sources = cameras_towards(
+        towards_sources,
+        target=centre,
+        distance=distance,
+        half_extent=half_extent,
+        size=options.size,
+        orthographic=options.sources == "orthographic",
+    )
+    return targets, sources
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """A picture: rgba uint8 (H, W, 4), depth uint16 (H, W) in mm."""
+
+    rgba: np.ndarray
+    depth: np.ndarray
+
+
+class _Studio:
+    """A surface made ready for pictures from many cameras."""
+
+    def __init__(self, surface: SurfaceMesh, options: CaptureOptions):
+        self._surface = surface
+        self._options = options
+        self._caster = RayCaster(surface)
+        self._normals = triangle_normals(surface)
+        self._levels: dict[float, np.ndarray] = {}
+        self._outline: dict[float, torch.Tensor] = {}
+
+    def shoot(self, camera: Cameras) -> _Shot:
+        """Take one picture; camera of shape ().
+
+        A ray through every pixel's centre finds the large parts; whatever else touches a pixel has an edge
+        of a triangle in it,
+        so that pixels without either are empty and cost one ray.
+        """
+        height, width = camera.height, camera.width
+        seen, depth = np.zeros((height, width), dtype=bool), np.zeros((height, width), np.uint16)
+        near_edges = self._edge_pixels(camera)
+        rows, columns = np.nonzero(_filled_box(near_edges))
+        hits, directions = self._trace(camera, np.stack((columns, rows), axis=-1) + 0.5)
+        hit = hits.triangles >= 0
+        seen[rows[hit], columns[hit]] = True
+        axis = -camera.world_from_camera[:3, 2].numpy()
+        along = hits.distances[hit] * (directions[hit] @ axis)
+        depth[rows[hit], columns[hit]] = np.clip(np.rint(1000.0 * along), 1, 65535).astype(np.uint16)
+
+        rows, columns = np.nonzero(seen | near_edges)
+        linear = self._supersample(camera, rows, columns, self._options.subsamples)
+        partial = (linear[:, 3] > 0.0) & (linear[:, 3] < 1.0)
+        linear[partial] = self._supersample(
+            camera, rows[partial], columns[partial], self._options.edge_subsamples
+        )
+        rgba = np.zeros((height, width, 4), np.uint8)
+        rgba[rows, columns] = _encode(linear)
+        return _Shot(rgba=rgba, depth=depth)
+
+    def _trace(self, camera: Cameras, pixels: np.ndarray) -> tuple[Hits, np.ndarray]:
+        """Hits of rays through pixel positions (R, 2), and the rays' directions (R, 3)."""
+        rays = pixel_rays(camera, torch.from_numpy(pixels))
+        directions = rays.directions.float().numpy()
+        return self._caster.first_hits(rays.origins.float().numpy(), directions), directions
+
+    def _supersample(self, camera: Cameras, rows: np.ndarray, columns: np.ndarray, side: int) -> np.ndarray:
+        """Linear RGBA (K, 4) of pixels (K,): mean colour of what is hit, alpha the share that is hit."""
+        steps = (np.arange(side) + 0.5) / side
+        inside = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        pixels = np.stack((columns, rows), axis=-1)[:, None] + inside
+        hits, directions = self._trace(camera, pixels.reshape(-1, 2))
+        hit = np.flatnonzero(hits.triangles >= 0)
+        triangles = hits.triangles[hit]
+        levels = self._texture_levels(_pixel_size(camera) / side)
+        colors = shade(self._surface, triangles, hits.u[hit], hits.v[hit], levels)[:, :3]
+        colors = self._options.light.lit(colors, self._normals[triangles], directions[hit])
+        count, owner = len(rows), hit // side**2
+        total = np.bincount(owner, minlength=count)
+        sums = [np.bincount(owner, weights=channel, minlength=count) for channel in colors.T]
+        rgb = np.stack(sums, axis=-1) / np.maximum(total, 1)[:, None]
+        return np.concatenate((rgb, (total / side**2)[:, None]), axis=-1)
+
+    def _texture_levels(self, footprint: float) -> np.ndarray:
+        if footprint not in self._levels:
+            self._levels[footprint] = texture_levels(self._surface, footprint)
+        return self._levels[footprint]
+
+    def _edge_pixels(self, camera: Cameras) -> np.ndarray:
+        """Pixels (H, W) that an edge of a triangle may touch, and their neighbours."""
+        spacing = 0.6 * _pixel_size(camera)  # nearer parts appear up to 1.7 times larger
+        if spacing not in self._outline:
+            self._outline[spacing] = torch.from_numpy(
+                _points_on_edges(self._surface.triangles, 0.5 * spacing)
+            )
+        pixels, _, in_front = project(camera, self._outline[spacing])
+        indices = torch.floor(pixels[in_front]).long()
+        columns = indices[:, 0].clamp(0, camera.width - 1)
+        rows = indices[:, 1].clamp(0, camera.height - 1)
+        touched = np.zeros((camera.height, camera.width), dtype=bool)
+        touched[rows.numpy(), columns.numpy()] = True
+        return ndimage.binary_dilation(touched, structure=np.ones((3, 3), dtype=bool))
+
+
+def _pixel_size(camera: Cameras) -> float:
+    """Side of a pixel at the character's centre, m."""
+    focal = float(camera.focal[0])
+    if bool(camera.orthographic):
+        return 1.0 / focal
+    return float(np.linalg.norm(camera.world_from_camera[:3, 3].numpy() - np.array(CENTRE))) / focal
+
+
+def _points_on_edges(triangles: np.ndarray, spacing: float) -> np.ndarray:
+    """Points (n, 3), float64, so that none of the triangles' edges is farther than the spacing from one."""
+    starts = triangles.reshape(-1, 3).astype(np.float64)
+    ends = np.roll(triangles, -1, axis=1).reshape(-1, 3).astype(np.float64)
+    counts = np.ceil(np.linalg.norm(ends - starts, axis=-1) / spacing).astype(np.int64) + 1
+    edge = np.repeat(np.arange(len(starts)), counts)
+    first = np.cumsum(counts) - counts
+    share = (np.arange(len(edge)) - first[edge]) / np.maximum(counts - 1, 1)[edge]
+    points = starts[edge] + share[:, None] * (ends - starts)[edge]
+    cells = np.floor(points / spacing).astype(np.int64)
+    cells -= cells.min(axis=0)
+    shape = cells.max(axis=0) + 1
+    keys = (cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2]
+    return points[np.unique(keys, return_index=True)[1]]
+
+
+def _filled_box(mask: np.ndarray) -> np.ndarray:
+    """The bounding box of what is set, as a mask."""
+    box = np.zeros_like(mask)
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if len(rows):
+        box[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
+    return box
+
+
+def _encode(linear: np.ndarray) -> np.ndarray:
+    """uint8 sRGB with straight alpha (K, 4) of linear RGBA."""
+    rgba = np.concatenate((srgb_from_linear(linear[:, :3]), linear[:, 3:]), axis=-1)
+    return np.rint(255.0 * rgba).astype(np.uint8)

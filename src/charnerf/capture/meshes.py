@@ -1,0 +1,175 @@
+"""Mesh files to scenes in the world frame: +Z up, facing -Y, 2 m tall, feet on z = 0, centred."""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from charnerf.data.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
+from charnerf.errors import DataError
+
+HEIGHT = 2.0
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+_DEFAULT_AXES = {
+    ".glb": ("y", "+z"),
+    ".gltf": ("y", "+z"),
+    ".obj": ("y", "+z"),
+    ".ply": ("z", "-y"),
+    ".stl": ("z", "-y"),
+}
+_FACINGS = {"y": ("+z", "-z", "+x", "-x"), "z": ("-y", "+y", "+x", "-x")}
+
+
+def load_scene(path: str | Path, up: str | None = None, facing: str | None = None) -> trimesh.Scene:
+    """Load a mesh file into the world frame.
+
+    Args:
+        path: GLB, glTF, OBJ, PLY or STL.
+        up: Axis of the file that points up, "y" or "z"; None for the format's own.
+        facing: Signed axis of the file that the character faces, such as "+z" or "-y"; None for the format's
+            own.
+
+    Returns:
+        A scene whose graph carries the change of frame; colours as data/scene_mesh.py reads them.
+
+    Raises:
+        DataError: If the file is missing, of another format, unreadable, without faces, or has vertices that
+            are not finite.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise DataError(
+            f"{path}: found the suffix {suffix!r}, expected one of {', '.join(SUFFIXES)}; convert it."
+        )
+    if not path.is_file():
+        raise DataError(f"{path}: no such file, expected a mesh.")
+    rotation = axes_rotation(*_axes(path, up, facing))
+    try:
+        scene = trimesh.load_scene(path, process=False)
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except Exception as err:  # trimesh's readers raise every kind
+        raise DataError(
+            f"{path}: can not be read as a mesh ({type(err).__name__}: {err}); export it again."
+        ) from err
+    _note_colors(scene, path)
+    _check_geometry(scene, path)
+    return to_world(scene, rotation, where=str(path))
+
+
+def axes_rotation(up: str, facing: str) -> np.ndarray:
+    """Rotation (3, 3) from a file's axes to the world's.
+
+    Args:
+        up: "y" or "z".
+        facing: Signed axis across it.
+
+    Raises:
+        DataError: If the two are no such axes.
+    """
+    if up not in _FACINGS or facing not in _FACINGS[up]:
+        raise DataError(
+            f"up = {up!r}, facing = {facing!r}: expected up y with facing one of {', '.join(_FACINGS['y'])}, "
+            f"or up z with facing one of {', '.join(_FACINGS['z'])}."
+        )
+    file_up = _axis("+" + up)
+    file_front = _axis(facing)
+    file_left = np.cross(file_up, file_front)
+    world = np.stack((_axis("+z"), _axis("-y"), np.cross(_axis("+z"), _axis("-y"))), axis=1)
+    return world @ np.stack((file_up, file_front, file_left), axis=1).T
+
+
+def to_world(scene: trimesh.Scene, rotation: np.ndarray, *, where: str) -> trimesh.Scene:
+    """Rotate a scene, scale it to 2 m, set its feet on z = 0 and its middle on the z axis.
+
+    Args:
+        scene: The scene, in its file's frame; changed and returned.
+        rotation: World from file, (3, 3).
+        where: What messages name.
+
+    Raises:
+        DataError: If it has no height.
+    """
+    points = np.concatenate([vertices[np.unique(faces)] for _, vertices, faces in placed_meshes(scene)])
+    points = points @ rotation.T
+    low, high = points.min(axis=0), points.max(axis=0)
+    height = high[2] - low[2]
+    if not height > 1e-9 * max(1.0, float(np.abs(points).max())):
+        raise DataError(
+            f"{where}: found a height of {height:.3g} along its up axis, expected a body; check --up."
+        )
+    scale = HEIGHT / height
+    transform = np.eye(4)
+    transform[:3, :3] = scale * rotation
+    transform[:3, 3] = -scale * np.array(((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]))
+    scene.apply_transform(transform)
+    return scene
+
+
+def _axes(path: Path, up: str | None, facing: str | None) -> tuple[str, str]:
+    own_up, own_facing = _DEFAULT_AXES[path.suffix.lower()]
+    if up is None and facing is not None:
+        up = own_up if facing[-1:] != own_up else None
+        up = up or ("z" if own_up == "y" else "y")
+    up = up or own_up
+    if facing is None:
+        facing = own_facing if up == own_up else _FACINGS[up][0]
+    return up, facing
+
+
+def _axis(name: str) -> np.ndarray:
+    vector = np.zeros(3)
+    vector["xyz".index(name[1])] = 1.0 if name[0] == "+" else -1.0
+    return vector
+
+
+def _check_geometry(scene: trimesh.Scene, path: Path) -> None:
+    meshes = placed_meshes(scene)
+    if not meshes:
+        raise DataError(
+            f"{path}: found no faces, expected a triangle mesh; point clouds and lines can not be captured."
+        )
+    for mesh, vertices, faces in meshes:
+        name = mesh.metadata.get("name", "mesh")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise DataError(f"{path}: {name}: a face names a vertex that is not there; export it again.")
+        bad = int((~np.isfinite(vertices)).any(axis=1).sum())
+        if bad:
+            raise DataError(
+                f"{path}: {name}: found {bad} of {len(vertices)} vertices not finite (NaN or infinity), "
+                "expected numbers; repair the mesh."
+            )
+
+
+def _note_colors(scene: trimesh.Scene, path: Path) -> None:
+    """Mark sRGB vertex colours, and keep glTF's colour factors in full."""
+    suffix = path.suffix.lower()
+    if suffix not in (".glb", ".gltf"):
+        for mesh in scene.geometry.values():
+            mesh.metadata[COLORS_KEY] = "srgb"
+        return
+    factors: dict[str, list[np.ndarray]] = {}
+    for material in _gltf_header(path).get("materials", []):
+        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
+        if factor is not None:
+            factors.setdefault(material.get("name"), []).append(np.array(factor, dtype=np.float64))
+    for mesh in scene.geometry.values():
+        kept = getattr(getattr(mesh.visual, "material", None), "baseColorFactor", None)
+        if kept is None:
+            continue
+        for factor in factors.get(mesh.visual.material.name, []):
+            if np.abs(factor * 255.0 - kept).max() <= 1.0:
+                mesh.metadata[FACTOR_KEY] = factor.tolist()
+                break
+
+
+def _gltf_header(path: Path) -> dict[str, Any]:
+    content = path.read_bytes()
+    if content[:4] == b"glTF":
+        (length,) = struct.unpack_from("<I", content, 12)
+        content = content[20 : 20 + length]
+    return json.loads(content)
