@@ -1,0 +1,91 @@
+"""Which points of a surface some camera sees."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from charnerf.data.layout import TRANSFORMS_FILE
+from charnerf.data.raycast import RayCaster
+from charnerf.data.surface_mesh import SurfaceMesh, triangle_normals
+from charnerf.data.transforms import read_transforms
+from charnerf.geometry.cameras import cameras_towards, direction_from_angles, fibonacci_hemisphere
+from charnerf.types import Cameras
+
+_TOLERANCE = 3e-4  # m in front of a point that is still the point: float32 along rays of some metres
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What cameras see of points (K,): visible, bool; normals (K, 3) towards the first camera that does."""
+
+    visible: np.ndarray
+    normals: np.ndarray
+
+
+def see_points(mesh: SurfaceMesh, points: np.ndarray, triangles: np.ndarray, cameras: Cameras) -> Seen:
+    """Ask each camera for the points that none before it saw.
+
+    Args:
+        mesh: The surface.
+        points: On it, float32 (K, 3), m.
+        triangles: Their triangles, (K,).
+        cameras: (N,).
+    """
+    caster = RayCaster(mesh)
+    normals = triangle_normals(mesh)[triangles]
+    visible = np.zeros(len(points), dtype=bool)
+    hidden = np.arange(len(points))
+    for index in _spread_order(len(cameras.orthographic)):
+        if len(hidden) == 0:
+            break
+        origins, directions, distances = _rays_to(cameras[index], points[hidden])
+        hits = caster.first_hits(origins, directions)
+        seen = (hits.triangles == triangles[hidden]) | (hits.distances > distances - _TOLERANCE)
+        away = (normals[hidden] * directions).sum(axis=-1) > 0.0
+        normals[hidden[seen & away]] *= -1.0
+        visible[hidden[seen]] = True
+        hidden = hidden[~seen]
+    return Seen(visible=visible, normals=normals)
+
+
+def capture_cameras(mesh_file: Path) -> Cameras | None:
+    """Target cameras of the character that a mesh file lies in, None where there is no transforms.json."""
+    folder = mesh_file.parent.parent
+    return read_transforms(folder).cameras if (folder / TRANSFORMS_FILE).is_file() else None
+
+
+def default_cameras(mesh: SurfaceMesh) -> Cameras:
+    """Cameras (51,) as a capture sets them: a Fibonacci hemisphere, and level ones in front, beside, behind."""
+    centre = torch.tensor((0.0, 0.0, 1.0), dtype=torch.float64)
+    reach = float(np.linalg.norm(mesh.triangles.reshape(-1, 3) - centre.numpy(), axis=-1).max())
+    level = direction_from_angles(
+        torch.tensor((0.0, 90.0, 180.0), dtype=torch.float64), torch.zeros(3).double()
+    )
+    return cameras_towards(
+        torch.cat((fibonacci_hemisphere(48), level)),
+        target=centre,
+        distance=max(4.0, 2.5 * reach),
+        half_extent=max(1.0, 1.05 * reach),
+        size=128,
+        orthographic=False,
+    )
+
+
+def _rays_to(camera: Cameras, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rays of a camera through points (K, 3): origins, unit directions, distances to the points."""
+    pose = camera.world_from_camera.double().numpy()
+    if bool(camera.orthographic):
+        distances = (pose[:3, 3] - points) @ pose[:3, 2]
+        directions = np.broadcast_to(-pose[:3, 2], points.shape).astype(np.float32)
+        return (points - distances[:, None] * directions).astype(np.float32), directions, distances
+    offsets = points - pose[:3, 3]
+    distances = np.linalg.norm(offsets, axis=-1)
+    directions = (offsets / distances[:, None]).astype(np.float32)
+    return np.broadcast_to(pose[:3, 3], points.shape).astype(np.float32), directions, distances
+
+
+def _spread_order(count: int) -> list[int]:
+    """Indices in an order that soon covers all directions, so that few cameras see most points."""
+    return sorted(range(count), key=lambda index: (index * 0.618034) % 1.0)
