@@ -1,0 +1,1 @@
+"""Drawings to source views: read, cut out, aligned."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import trimesh
 
@@ -13,10 +12,7 @@ from charnerf.meshing.calibrate import LevelChoice, choose_level
 from charnerf.meshing.colour import colour_vertices
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import extract_surface, fit_height, simplify
-from charnerf.types import LeftOut, SourceViews
-
-if TYPE_CHECKING:
-    from charnerf.volume.scene import Scene
+from charnerf.types import LeftOut, Scene, SourceViews
 
 
 @dataclass(frozen=True)

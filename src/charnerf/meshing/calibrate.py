@@ -84,9 +84,9 @@ def choose_level(grid: DensityGrid, views: SourceViews | None) -> LevelChoice:
         low, high = float(grid.densities.min()), float(grid.densities.max())
         raise NumericalError(
             f"density grid: found densities from {low:.3g} to {high:.3g} 1/m, expected an opaque figure: no "
-            f"level from "
+            "level from "
             f"{LEVELS[0]:g} to {LEVELS[-1]:g} 1/m shows a silhouette. The field is empty: train longer, or "
-            f"check the drawings' masks."
+            "check the drawings' masks."
         )
     return LevelChoice(level=LEVELS[best], iou=float(scores[best]), tried=tuple(tried))
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import torch
 import trimesh
 
 from charnerf.errors import NumericalError
 from charnerf.meshing.density_grid import CHUNK
-
-if TYPE_CHECKING:
-    from charnerf.volume.scene import Scene
+from charnerf.types import Scene
 
 
 @torch.no_grad()
@@ -38,7 +34,7 @@ def colour_vertices(scene: Scene, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     if not np.isfinite(rgb).all():
         raise NumericalError(
             f"vertex colours: found {int((~np.isfinite(rgb)).sum())} of {rgb.size} values not finite, "
-            f"expected colours in [0, 1]. "
+            "expected colours in [0, 1]. "
             "The weights are broken: load another checkpoint."
         )
     rgba = np.full((len(rgb), 4), 255, np.uint8)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -20,10 +19,7 @@ from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import fibonacci_hemisphere
 from charnerf.geometry.hull import hull_contains
 from charnerf.geometry.safe import safe_normalize
-from charnerf.types import LeftOut
-
-if TYPE_CHECKING:
-    from charnerf.volume.scene import Scene
+from charnerf.types import LeftOut, Scene
 
 BLOCK = 4  # cells a side
 CHUNK = 8192  # points evaluated at once; larger batches leave the caches
@@ -82,7 +78,7 @@ def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
         bad = int((~densities.isfinite()).sum())
         raise NumericalError(
             f"density field: found {bad} of {densities.numel()} values not finite, expected finite "
-            f"densities. "
+            "densities. "
             "The weights are broken: load another checkpoint."
         )
     return densities
