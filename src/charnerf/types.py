@@ -6,7 +6,7 @@ Frames (design): world in metres, +Z up, facing -Y; cameras OpenGL/Blender (+X r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -100,6 +100,14 @@ class SurfacePoints(TensorRecord):
 
     points: Tensor
     rgb: Tensor
+
+
+@dataclass(frozen=True)
+class SpacePoints(TensorRecord):
+    """Points in space, (B, P, 3), m, and whether they are inside the character, (B, P), 1 or 0."""
+
+    points: Tensor
+    inside: Tensor
 
 
 @dataclass(frozen=True)
@@ -209,3 +217,45 @@ class Rendering:
     finest: RenderOutput
     coarse: RenderOutput | None
     left_out: LeftOut
+
+
+@dataclass(frozen=True)
+class TrainBatch:
+    """One training step's material.
+
+    Attributes:
+        names: The B characters.
+        views: Their drawings, (B, V).
+        hull: Their hulls, or None for a model without.
+        rays: Target rays (B, R).
+        rgb: Their colours on white, (B, R, 3).
+        alpha: Their alpha, (B, R).
+        depth: Distance along the ray to the surface, (B, R), m, 0 where there is none; None where no loss reads it.
+        surface: Points on the surface, or None where no loss reads them or a character has no mesh.
+        space: Points in the hull labelled inside or outside by the silhouettes, or None where no loss reads them.
+        phase: Index of the schedule's phase.
+        loss_weights: Weights that the phase overrides, by term.
+        step: Index of the batch, from 0; seeds everything random in it.
+    """
+
+    names: tuple[str, ...]
+    views: SourceViews
+    hull: Hull | None
+    rays: RayBundle
+    rgb: Tensor
+    alpha: Tensor
+    depth: Tensor | None
+    surface: SurfacePoints | None
+    space: SpacePoints | None
+    phase: int
+    loss_weights: Mapping[str, float]
+    step: int
+
+    def to(self, device: torch.device | str, *, non_blocking: bool = False) -> TrainBatch:
+        """Return a copy whose tensors are on a device."""
+        moved = {
+            field.name: value.to(device, non_blocking=non_blocking)
+            for field in fields(self)
+            if isinstance(value := getattr(self, field.name), Tensor | TensorRecord)
+        }
+        return replace(self, **moved)

@@ -1,0 +1,203 @@
+"""Training batches: target rays and surface points of a few characters, drawn from the step's own seed."""
+
+from collections.abc import Callable
+from typing import Protocol, final
+
+import torch
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from charnerf.data.sampler import BatchRequest
+from charnerf.data.silhouettes import label_points
+from charnerf.data.store import CharacterStore, OpenCharacter
+from charnerf.errors import DataError
+from charnerf.geometry.cameras import pixel_rays
+from charnerf.types import Cameras, Hull, RayBundle, SourceViews, SpacePoints, SurfacePoints, TrainBatch
+
+
+class Surface(Protocol):
+    """A surface that points can be drawn from (data/surface.py has two)."""
+
+    def sample(self, num_points: int, generator: torch.Generator) -> SurfacePoints:
+        """Draw points, B = 1."""
+        ...
+
+
+SurfaceOf = Callable[[OpenCharacter], Surface | None]
+
+
+@final
+class MixedDataset(Dataset[TrainBatch]):
+    """Rays and surface points (paper, Mix of 2d ray sampling and 3d surface sampling).
+
+    Args:
+        store: The characters.
+        surface_of: A character's surface, None where no loss reads it or there is no mesh.
+        characters: B, characters a step.
+        foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white.
+        space_points: Labelled points a step, 0 where no loss reads them.
+        reads_depth: Whether depth pictures are read.
+        seed: Of the run.
+    """
+
+    def __init__(
+        self,
+        *,
+        store: CharacterStore,
+        surface_of: SurfaceOf,
+        characters: int,
+        foreground_share: float,
+        space_points: int,
+        reads_depth: bool,
+        seed: int,
+    ) -> None:
+        self.store = store
+        self.surface_of = surface_of
+        self.characters = min(characters, len(store))
+        self.foreground_share = foreground_share
+        self.space_points = space_points
+        self.reads_depth = reads_depth
+        self.seed = seed
+
+    def __getitem__(self, request: BatchRequest) -> TrainBatch:  # type: ignore[override]
+        """Make the batch of a request; the same request makes the same batch."""
+        generator = torch.Generator().manual_seed((self.seed << 40) + request.step)
+        chosen = torch.randperm(len(self.store), generator=generator)[: self.characters]
+        opened = [self.store.open(self.store.names[int(index)]) for index in chosen]
+        rays = _shares(request.rays, len(opened))
+        drawn = [self._rays(one, rays, generator) for one in opened]
+        points = _shares(request.surface_points, len(opened))
+        surfaces = [self.surface_of(one) for one in opened]
+        surface = _sample_surfaces(surfaces, points, generator) if points else None
+        space = self._space(opened, generator)
+        return TrainBatch(
+            names=tuple(one.character.name for one in opened),
+            views=stack_views([one.character.sources for one in opened]),
+            hull=_stack_hulls(opened),
+            rays=RayBundle(
+                origins=torch.stack([d[0].origins for d in drawn]),
+                directions=torch.stack([d[0].directions for d in drawn]),
+            ),
+            rgb=torch.stack([d[1] for d in drawn]),
+            alpha=torch.stack([d[2] for d in drawn]),
+            depth=torch.stack([d[3] for d in drawn]) if self.reads_depth else None,
+            surface=surface,
+            space=space,
+            phase=request.phase,
+            loss_weights=request.loss_weights,
+            step=request.step,
+        )
+
+    def _rays(
+        self, one: OpenCharacter, num_rays: int, generator: torch.Generator
+    ) -> tuple[RayBundle, Tensor, Tensor, Tensor]:
+        """Rays with colour, alpha and depth of one character."""
+        num_images, height, width = one.images.shape[:3]
+        num_foreground = round(self.foreground_share * num_rays) if len(one.foreground) else 0
+        anywhere = torch.randint(
+            num_images * height * width, (num_rays - num_foreground,), generator=generator
+        )
+        if num_foreground:
+            picked = torch.randint(len(one.foreground), (num_foreground,), generator=generator)
+            flat = torch.cat((one.foreground[picked].long(), anywhere))
+        else:
+            flat = anywhere
+        image, rest = flat // (height * width), flat % (height * width)
+        pixels = torch.stack((rest % width + 0.5, rest // width + 0.5), dim=-1)
+        rgba = one.images.reshape(-1, 4)[flat].float() / 255.0
+        rgb, alpha = rgba[:, :3], rgba[:, 3]
+        camera = one.character.cameras[image]
+        rays = pixel_rays(camera, pixels)
+        depth = self._depths(one, image, rest, camera, rays) if self.reads_depth else alpha
+        return rays, rgb * alpha[:, None] + (1.0 - alpha[:, None]), alpha, depth
+
+    def _depths(
+        self, one: OpenCharacter, image: Tensor, rest: Tensor, camera: Cameras, rays: RayBundle
+    ) -> Tensor:
+        """Distance along the ray from depth along the camera's axis, (R,), m."""
+        axis = -camera.world_from_camera[..., :3, 2]
+        used, inverse = image.unique(return_inverse=True)
+        depths = one.character.depths(used.tolist()).flatten(1)
+        return depths[inverse, rest] / (axis * rays.directions).sum(-1).clamp_min(1e-6)
+
+    def _space(self, opened: list[OpenCharacter], generator: torch.Generator) -> SpacePoints | None:
+        """Labelled points in the hulls, None where no loss reads them."""
+        if self.space_points == 0:
+            return None
+        if any(one.hull is None for one in opened):
+            raise DataError(
+                "loss.weights.occupancy: found a weight above 0 with model.hull=false, expected a hull to draw labelled "
+                "points in; set the weight to 0 or model.hull=true."
+            )
+        parts = [label_points(one, _shares(self.space_points, len(opened)), generator) for one in opened]
+        return SpacePoints(
+            points=torch.stack([p[0] for p in parts]), inside=torch.stack([p[1] for p in parts])
+        )
+
+
+def stack_views(views: list[SourceViews]) -> SourceViews:
+    """Characters with different numbers of views as one batch, padded with absent views."""
+    most = max(view.present.shape[1] for view in views)
+
+    def padded(tensors: list[Tensor]) -> Tensor:
+        rows = []
+        for tensor in tensors:
+            missing = most - tensor.shape[1]
+            rows.append(torch.cat((tensor, tensor[:, -1:].expand(-1, missing, *tensor.shape[2:])), dim=1))
+        return torch.cat(rows)
+
+    cameras = [view.cameras for view in views]
+    present = padded([view.present for view in views])
+    counts = torch.tensor([view.present.shape[1] for view in views])
+    return SourceViews(
+        images=padded([view.images for view in views]),
+        cameras=Cameras(
+            world_from_camera=padded([c.world_from_camera for c in cameras]),
+            focal=padded([c.focal for c in cameras]),
+            principal_point=padded([c.principal_point for c in cameras]),
+            orthographic=padded([c.orthographic for c in cameras]),
+            width=cameras[0].width,
+            height=cameras[0].height,
+        ),
+        present=present & (torch.arange(most) < counts[:, None]),
+        mirrored=padded([view.mirrored for view in views]),
+    )
+
+
+def _shares(total: int, parts: int) -> int:
+    """Equal shares of a total, rounded up."""
+    return -(-total // parts)
+
+
+def _sample_surfaces(
+    surfaces: list[Surface | None], num_points: int, generator: torch.Generator
+) -> SurfacePoints | None:
+    """Points on every character's surface; None if one has no mesh (rays alone then)."""
+    if any(surface is None for surface in surfaces):
+        return None
+    samples = [surface.sample(num_points, generator) for surface in surfaces if surface is not None]
+    return SurfacePoints(
+        points=torch.cat([s.points for s in samples]), rgb=torch.cat([s.rgb for s in samples])
+    )
+
+
+def _stack_hulls(opened: list[OpenCharacter]) -> Hull | None:
+    """Hulls of a batch, maps padded to the most views."""
+    hulls = [one.hull for one in opened if one.hull is not None]
+    if not hulls:
+        return None
+    most = max(hull.dilations.shape[1] for hull in hulls)
+
+    def padded(tensor: Tensor) -> Tensor:
+        return torch.cat(
+            (tensor, tensor[:, -1:].expand(-1, most - tensor.shape[1], *tensor.shape[2:])), dim=1
+        )
+
+    return Hull(
+        occupancy=torch.cat([hull.occupancy for hull in hulls]),
+        box_min=torch.cat([hull.box_min for hull in hulls]),
+        box_max=torch.cat([hull.box_max for hull in hulls]),
+        front_depths=torch.cat([padded(hull.front_depths) for hull in hulls]),
+        edge_distances=torch.cat([padded(hull.edge_distances) for hull in hulls]),
+        dilations=torch.cat([padded(hull.dilations) for hull in hulls]),
+    )

@@ -1,0 +1,82 @@
+"""Which batch comes next: the sampler asks the schedule for counts, in the main process, so that they are exact and resumable."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol, final
+
+from torch.utils.data import Sampler
+
+from charnerf.schedule import PhaseSchedule
+
+
+@dataclass(frozen=True)
+class RunPosition:
+    """Where a run stands: steps done, training seconds, share of the budget used up."""
+
+    step: int
+    seconds: float
+    progress: float
+
+
+class Position(Protocol):
+    """Something that knows where the run stands."""
+
+    def __call__(self) -> RunPosition:
+        """Return the position now."""
+        ...
+
+
+@dataclass(frozen=True)
+class BatchRequest:
+    """What a batch shall hold.
+
+    Attributes:
+        step: Index of the batch in the run; seeds everything random in it.
+        rays: Rays, of all characters together.
+        surface_points: Surface points, of all characters together.
+        phase: Index of the phase.
+        loss_weights: Loss weights that the phase overrides.
+    """
+
+    step: int
+    rays: int
+    surface_points: int
+    phase: int
+    loss_weights: Mapping[str, float]
+
+
+@final
+class PhaseSampler(Sampler[BatchRequest]):
+    """Requests until the next mark of progress or the end of the budget; an epoch is a stretch between two validations.
+
+    Args:
+        schedule: The phases.
+        position: Where the run stands, asked before each batch.
+        num_marks: Stretches that a run is divided into.
+    """
+
+    def __init__(self, *, schedule: PhaseSchedule, position: Position, num_marks: int) -> None:
+        self.schedule = schedule
+        self.position = position
+        self.num_marks = num_marks
+
+    def __iter__(self) -> Iterator[BatchRequest]:
+        """Yield requests of one epoch."""
+        stretch = self._stretch(self.position())
+        while True:
+            now = self.position()
+            if now.progress >= 1.0 or self._stretch(now) > stretch:
+                return
+            arguments = {"step": now.step, "seconds": now.seconds, "progress": now.progress}
+            index = self.schedule.index_at(**arguments)
+            phase = self.schedule.phases[index]
+            yield BatchRequest(
+                step=now.step,
+                rays=phase.rays,
+                surface_points=phase.surface_points,
+                phase=index,
+                loss_weights=phase.loss_weights,
+            )
+
+    def _stretch(self, now: RunPosition) -> int:
+        return int(now.progress * self.num_marks)

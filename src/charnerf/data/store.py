@@ -1,0 +1,84 @@
+"""Characters in memory, opened when first asked for, within a memory bound."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import torch
+from torch import Tensor
+
+from charnerf.data.characters import Character, load_character
+from charnerf.types import Hull, SourceViews
+
+
+@dataclass(frozen=True)
+class OpenCharacter:
+    """A character's pictures in memory.
+
+    Attributes:
+        character: The files.
+        images: uint8 (N, H, W, 4).
+        hull: Hull of its drawings (B = 1), None for a model without.
+        foreground: Flat indices into (N, H, W) of pixels that show the character, int32.
+    """
+
+    character: Character
+    images: Tensor
+    hull: Hull | None
+    foreground: Tensor
+
+    @property
+    def size_bytes(self) -> int:
+        """Memory of the tensors."""
+        hull = 0 if self.hull is None else self.hull.occupancy.numel() + 8 * self.hull.front_depths.numel()
+        return self.images.numel() + 4 * self.foreground.numel() + hull
+
+
+@final
+class CharacterStore:
+    """Least recently used characters are dropped when the bound is reached.
+
+    Args:
+        root: Data set.
+        names: Characters.
+        carve: Makes the hull of drawings (the model's `carve`).
+        memory_mib: Bound, MiB; at least one character is always kept.
+    """
+
+    def __init__(
+        self,
+        *,
+        root: Path,
+        names: Sequence[str],
+        carve: Callable[[SourceViews], Hull | None],
+        memory_mib: float,
+    ) -> None:
+        self.root = root
+        self.names = tuple(names)
+        self.carve = carve
+        self.memory_bytes = memory_mib * 2**20
+        self._open: OrderedDict[str, OpenCharacter] = OrderedDict()
+        self._used_bytes = 0
+
+    def __len__(self) -> int:
+        """Number of characters."""
+        return len(self.names)
+
+    def open(self, name: str) -> OpenCharacter:
+        """Return a character, from memory if it is there."""
+        found = self._open.get(name)
+        if found is not None:
+            self._open.move_to_end(name)
+            return found
+        character = load_character(self.root, name)
+        images = character.images(range(len(character.image_files)))
+        foreground = images[..., 3].reshape(-1).nonzero()[:, 0].to(torch.int32)
+        opened = OpenCharacter(character, images, self.carve(character.sources), foreground)
+        self._open[name] = opened
+        self._used_bytes += opened.size_bytes
+        while self._used_bytes > self.memory_bytes and len(self._open) > 1:
+            _, dropped = self._open.popitem(last=False)
+            self._used_bytes -= dropped.size_bytes
+        return opened

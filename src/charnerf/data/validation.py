@@ -1,0 +1,57 @@
+"""Validation pictures: a few fixed views of each validation character."""
+
+from dataclasses import dataclass
+from typing import final
+
+import torch
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from charnerf.data.store import CharacterStore
+from charnerf.types import Cameras, Hull, SourceViews, TensorRecord
+
+
+@dataclass(frozen=True)
+class ValidationView(TensorRecord):
+    """One picture: drawings (B = 1), hull, camera of shape () and the true picture (H, W, 4)."""
+
+    views: SourceViews
+    hull: Hull | None
+    camera: Cameras
+    rgba: Tensor
+
+
+@final
+class ValidationDataset(Dataset[ValidationView]):
+    """Views spread evenly over the frames of each character.
+
+    Args:
+        store: The characters.
+        views: Pictures a character.
+    """
+
+    def __init__(self, *, store: CharacterStore, views: int) -> None:
+        self.store = store
+        self.views = views
+
+    def __len__(self) -> int:
+        """Number of pictures."""
+        return len(self.store) * self.views
+
+    def __getitem__(self, index: int) -> ValidationView:
+        """Open one picture."""
+        one = self.store.open(self.store.names[index // self.views])
+        frame = spread_frames(len(one.images), self.views)[index % self.views]
+        return ValidationView(
+            views=one.character.sources,
+            hull=one.hull,
+            camera=one.character.cameras[frame],
+            rgba=one.images[frame].float() / 255.0,
+        )
+
+
+def spread_frames(num_frames: int, wanted: int) -> list[int]:
+    """Evenly chosen indices of frames; all of them where fewer exist than are wanted."""
+    if wanted >= num_frames:
+        return list(range(num_frames))
+    return torch.linspace(0, num_frames - 1, wanted + 2)[1:-1].round().long().tolist()

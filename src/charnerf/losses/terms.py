@@ -1,0 +1,39 @@
+"""The loss terms as pure functions; each is a mean over rays or points."""
+
+from torch import Tensor
+
+
+def squared_color_error(rgb: Tensor, target_rgb: Tensor) -> Tensor:
+    """Mean over (...) of the squared 2-norm, which sums over the channels, of (..., 3) colours.
+
+    Source: paper, Final Loss function.
+    """
+    return (rgb - target_rgb).square().sum(-1).mean()
+
+
+def absolute_alpha_error(alphas: Tensor, target_alphas: Tensor) -> Tensor:
+    """Mean over (...) of |alpha - target|.
+
+    Source: paper, Final Loss function.
+    """
+    return (alphas - target_alphas).abs().mean()
+
+
+def squared_opacity_error(opacity: Tensor, target_alphas: Tensor) -> Tensor:
+    """Mean over rays (...) of the squared difference of opacity and the picture's alpha (beyond the paper)."""
+    return (opacity - target_alphas).square().mean()
+
+
+def absolute_depth_error(depth: Tensor, target_depth: Tensor) -> Tensor:
+    """Mean over rays that meet the surface (target above 0) of |depth - target|, m; 0 if none does."""
+    known = (target_depth > 0).to(depth.dtype)
+    return ((depth - target_depth).abs() * known).sum() / known.sum().clamp_min(1.0)
+
+
+def balanced_occupancy_error(alphas: Tensor, inside: Tensor) -> Tensor:
+    """Mean squared difference of alpha and the label (...), inside and outside weighing the same (beyond the paper)."""
+    error = (alphas - inside).square()
+    outside = 1.0 - inside
+    within = (error * inside).sum() / inside.sum().clamp_min(1.0)
+    without = (error * outside).sum() / outside.sum().clamp_min(1.0)
+    return 0.5 * (within + without)

@@ -1,0 +1,73 @@
+"""Training time, evaluation excluded, and the share of the budget that is used up; survives a resume."""
+
+import time
+from typing import Any, final
+
+import lightning as L
+
+from charnerf.data.sampler import RunPosition
+from charnerf.schedule import progress_of_run
+
+
+@final
+class RunClock(L.Callback):
+    """Counts steps and training seconds, and stops the run when its budget is used up.
+
+    Args:
+        steps: Budget of steps, None for no bound.
+        seconds: Budget of training seconds, None for no bound.
+    """
+
+    def __init__(self, *, steps: int | None, seconds: float | None) -> None:
+        self.budget_steps = steps
+        self.budget_seconds = seconds
+        self.steps = 0
+        self._done_seconds = 0.0
+        self._running_since: float | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Training seconds until now."""
+        running = 0.0 if self._running_since is None else time.perf_counter() - self._running_since
+        return self._done_seconds + running
+
+    def position(self) -> RunPosition:
+        """Where the run stands."""
+        seconds = self.seconds
+        progress = progress_of_run(
+            step=self.steps, seconds=seconds, budget_steps=self.budget_steps, budget_seconds=self.budget_seconds
+        )
+        return RunPosition(step=self.steps, seconds=seconds, progress=progress)
+
+    def pause(self) -> None:
+        """Stop counting (evaluation, checkpoints)."""
+        self._done_seconds = self.seconds
+        self._running_since = None
+
+    def on_train_epoch_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Go on counting."""
+        self._running_since = time.perf_counter()
+
+    def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
+        """Count the step; stop at the end of the budget."""
+        self.steps += 1
+        if self.position().progress >= 1.0:
+            trainer.should_stop = True
+
+    def on_validation_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Validation is not training time."""
+        self.pause()
+
+    def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Nor is what happens between epochs."""
+        self.pause()
+
+    def state_dict(self) -> dict[str, Any]:
+        """What a resumed run goes on from."""
+        return {"steps": self.steps, "seconds": self.seconds}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        self.steps = int(state_dict["steps"])
+        self._done_seconds = float(state_dict["seconds"])
+        self._running_since = None

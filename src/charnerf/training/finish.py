@@ -1,0 +1,80 @@
+"""What follows training: test figures, a mesh, the report."""
+
+from pathlib import Path
+
+import lightning as L
+import numpy as np
+import torch
+from lightning.pytorch.loggers import TensorBoardLogger
+from omegaconf import DictConfig
+
+from charnerf.data.characters import load_character
+from charnerf.data.layout import names_of, read_dataset
+from charnerf.evaluation.evaluate import evaluate
+from charnerf.evaluation.metrics_file import write_metrics
+from charnerf.evaluation.report import write_run_report
+from charnerf.meshing.build import build_mesh
+from charnerf.meshing.export import save_mesh
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import Scene, SourceViews
+from charnerf.volume.renderers.base import AbstractRenderer
+
+MESH_RESOLUTION = 128
+
+
+def finish_run(
+    cfg: DictConfig,
+    folder: Path,
+    root: Path,
+    model: CharNeRF,
+    renderer: AbstractRenderer,
+    *,
+    train_seconds: float,
+    trainer: L.Trainer,
+) -> None:
+    """Evaluate the test split, write metrics.json, meshes/ and the report.
+
+    Args:
+        cfg: Of the run.
+        folder: Run folder.
+        root: Data set.
+        model: Trained, in eval mode.
+        renderer: For evaluation.
+        train_seconds: Training time, evaluation excluded.
+        trainer: Its logger gets the mesh.
+    """
+    device = next(model.parameters()).device
+
+    def make_mesh(scene: Scene, views: SourceViews) -> object:
+        return build_mesh(scene, views, resolution=MESH_RESOLUTION).mesh
+
+    metrics = evaluate(
+        model,
+        renderer,
+        root,
+        cfg.sampling.test_split,
+        views=cfg.scale.eval_views or "all",
+        output=folder / "images",
+        mesh=make_mesh,
+        device=device,
+        train_seconds=train_seconds,
+    )
+    write_metrics(folder / "metrics.json", metrics)
+    first = names_of(read_dataset(root), cfg.sampling.test_split)[0]
+    with torch.no_grad():
+        sources = load_character(root, first).sources.to(device)
+        scene = model.scene(model.encode(sources), 0)
+        built = build_mesh(scene, sources, resolution=MESH_RESOLUTION)
+    (folder / "meshes").mkdir(exist_ok=True)
+    save_mesh(built.mesh, folder / "meshes" / f"{first}.glb")
+    if isinstance(trainer.logger, TensorBoardLogger):
+        colors = np.asarray(built.mesh.visual.vertex_colors)[None, :, :3].copy()
+        trainer.logger.experiment.add_mesh(
+            f"mesh/{first}",
+            vertices=torch.from_numpy(np.asarray(built.mesh.vertices, dtype=np.float32)[None]),
+            colors=torch.from_numpy(colors),
+            faces=torch.from_numpy(np.asarray(built.mesh.faces, dtype=np.int64)[None]),
+            global_step=trainer.global_step,
+        )
+        trainer.logger.finalize("success")
+    write_run_report(folder)

@@ -1,0 +1,151 @@
+"""What a run shows while it trains: a progress bar with time left, the curve, pictures."""
+
+import csv
+import io
+import os
+from pathlib import Path
+from typing import Any, final
+
+import lightning as L
+import torch
+from lightning.pytorch.loggers import TensorBoardLogger
+from torch import Tensor
+from tqdm import tqdm
+
+from charnerf.data.validation import ValidationView
+from charnerf.losses.total import TERMS
+from charnerf.training.clock import RunClock
+from charnerf.training.module import TrainingModule
+
+CURVE_COLUMNS = ("step", "phase", "seconds", "rays", "val_psnr", "val_psnr_foreground", "val_ssim", *TERMS)
+PICTURES = 4
+
+
+@final
+class BudgetBar(L.Callback):
+    """One bar over the whole budget; tqdm's estimate is the time left.
+
+    Args:
+        clock: Of the run.
+    """
+
+    def __init__(self, *, clock: RunClock) -> None:
+        self.clock = clock
+        self.bar: Any = None
+
+    def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Open the bar."""
+        by_steps = self.clock.budget_seconds is None
+        total = self.clock.budget_steps if by_steps else self.clock.budget_seconds
+        self.bar = tqdm(
+            total=round(total or 0),
+            desc="training",
+            unit="step" if by_steps else "s",
+            bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} {unit}, left {remaining}{postfix}",
+            mininterval=1.0,
+        )
+
+    def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
+        """Move it."""
+        now = self.clock.steps if self.clock.budget_seconds is None else self.clock.seconds
+        self.bar.n = min(now, self.bar.total)
+        if self.clock.steps % 10 == 0:
+            loss = trainer.callback_metrics.get("train/loss/total")
+            best = trainer.callback_metrics.get("val/psnr_foreground")
+            shown = {"step": self.clock.steps, "loss": f"{float(loss):.4f}" if loss is not None else "-"}
+            if best is not None:
+                shown["val_fg"] = f"{float(best):.2f} dB"
+            self.bar.set_postfix(shown, refresh=False)
+            self.bar.refresh()
+
+    def on_train_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Close it."""
+        self.bar.close()
+
+
+@final
+class CurveWriter(L.Callback):
+    """Writes curve.csv: one row a validation, the whole file at once, so that it is never half-written.
+
+    Args:
+        path: The file.
+        clock: Of the run.
+    """
+
+    def __init__(self, *, path: Path, clock: RunClock) -> None:
+        self.path = path
+        self.clock = clock
+        self.rows: list[dict[str, float | int | str]] = []
+
+    def on_validation_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Add a row."""
+        if trainer.sanity_checking or trainer.global_rank != 0:
+            return
+        metrics = trainer.callback_metrics
+
+        def read(name: str) -> float | str:
+            return float(metrics[name]) if name in metrics else ""
+
+        row: dict[str, float | int | str] = {"step": self.clock.steps, "seconds": round(self.clock.seconds, 3)}
+        row |= {"phase": read("train/phase"), "rays": read("train/rays")}
+        row |= {name: read(f"val/{name[4:]}") for name in ("val_psnr", "val_psnr_foreground", "val_ssim")}
+        row |= {term: read(f"train/loss/{term}") for term in TERMS}
+        self.rows.append(row)
+        text = io.StringIO()
+        writer = csv.DictWriter(text, fieldnames=CURVE_COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self.rows)
+        aside = self.path.with_suffix(".partial")
+        aside.write_text(text.getvalue(), encoding="utf-8")
+        os.replace(aside, self.path)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Rows so far, for a resumed run."""
+        return {"rows": self.rows}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        self.rows = list(state_dict["rows"])
+
+
+@final
+class PictureLogger(L.Callback):
+    """Logs image grids at validation: the drawings, then truth, prediction, depth and opacity of some characters."""
+
+    def on_validation_batch_end(
+        self,
+        trainer: L.Trainer,
+        pl_module: L.LightningModule,
+        outputs: Any,
+        batch: ValidationView,
+        batch_idx: int,
+        dataloader_idx: int = 0,
+    ) -> None:
+        """Draw the first view of each of the first characters."""
+        data = trainer.datamodule.val_views  # type: ignore[attr-defined]
+        board = pl_module.logger
+        if trainer.sanity_checking or batch_idx % data or batch_idx // data >= PICTURES:
+            return
+        if not isinstance(board, TensorBoardLogger) or not isinstance(pl_module, TrainingModule):
+            return
+        with torch.no_grad():
+            scene = pl_module.model.scene(pl_module.model.encode(batch.views, batch.hull), 0)
+            output = pl_module.eval_renderer.render_camera(scene, batch.camera).finest
+        near, far = output.depth.min(), output.depth.max()
+        grey = ((far - output.depth) / (far - near).clamp_min(1e-6))[..., None].expand_as(output.rgb)
+        opacity = output.opacity[..., None].expand_as(output.rgb)
+        pictures = [_on_white(batch.rgba), output.rgb, grey, opacity]
+        drawings = [_on_white(image.permute(1, 2, 0)) for image in batch.views.images[0]]
+        number = batch_idx // data
+        step = trainer.global_step
+        board.experiment.add_image(f"val/inputs/{number}", _row(drawings), step)
+        board.experiment.add_image(f"val/truth_prediction_depth_opacity/{number}", _row(pictures), step)
+
+
+def _on_white(rgba: Tensor) -> Tensor:
+    return rgba[..., :3] * rgba[..., 3:] + (1.0 - rgba[..., 3:])
+
+
+def _row(pictures: list[Tensor]) -> Tensor:
+    """Pictures (H, W, 3) beside one another as (3, H, W * n)."""
+    return torch.cat([p.float().clamp(0, 1) for p in pictures], dim=1).permute(2, 0, 1).cpu()

@@ -1,0 +1,238 @@
+"""One run from a validated config: prepare data, train, evaluate the test split, mesh, report."""
+
+import ctypes
+import logging
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import lightning as L
+from lightning.pytorch.callbacks import ModelCheckpoint
+from lightning.pytorch.loggers import TensorBoardLogger
+from omegaconf import DictConfig, OmegaConf
+
+from charnerf.data.datamodule import MixedDataModule
+from charnerf.data.layout import names_of, read_dataset
+from charnerf.data.mixed import MixedDataset, SurfaceOf
+from charnerf.data.sampler import PhaseSampler
+from charnerf.data.store import CharacterStore, OpenCharacter
+from charnerf.data.surface import load_surface_mesh
+from charnerf.errors import ConfigError
+from charnerf.losses.total import WeightedLosses
+from charnerf.models.charnerf import CharNeRF
+from charnerf.runs import build_model, build_part, build_renderer, save_config, save_weights
+from charnerf.training.clock import RunClock
+from charnerf.training.finish import finish_run
+from charnerf.training.guards import FiniteGuard, WhiteAlarm
+from charnerf.training.module import TrainingModule
+from charnerf.training.monitor import BudgetBar, CurveWriter, PictureLogger
+from charnerf.volume.renderers.base import AbstractRenderer
+
+log = logging.getLogger(__name__)
+SURFACE_TERMS = ("surface_rgb", "surface_alpha")
+
+
+def run_training(cfg: DictConfig, folder: Path) -> None:
+    """Train, evaluate and report into a run folder.
+
+    Args:
+        cfg: Composed and validated.
+        folder: The run folder (design: On disk); made if it is missing.
+    """
+    keep_freed_memory()
+    L.seed_everything(cfg.seed, verbose=False)
+    folder.mkdir(parents=True, exist_ok=True)
+    checkpoint = find_checkpoint(cfg.ckpt_path, folder)
+    save_config(folder, cfg)
+    root = build_part(cfg.data).prepare()
+    model = build_model(cfg)
+    clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
+    losses: WeightedLosses = build_part(cfg.loss)
+    renderer = build_renderer(cfg)
+    module = TrainingModule(
+        model=model,
+        renderer=training_renderer(cfg),
+        eval_renderer=renderer,
+        losses=losses,
+        optimizer=build_part(cfg.optimizer),
+        final_rate=cfg.sampling.final_rate,
+        position=clock.position,
+        surface_delta=surface_delta(cfg),
+        seed=cfg.seed,
+    )
+    data = build_data(cfg, root, model, clock, losses)
+    trainer = build_trainer(cfg, folder, clock)
+    if trainer.is_global_zero:
+        log_hyperparameters(trainer, cfg, model)
+    with warnings.catch_warnings():
+        # the loaders are fed from memory, one request at a time: more workers would not help
+        warnings.filterwarnings("ignore", message=".*does not have many workers.*")
+        warnings.filterwarnings("ignore", message=".*`IterableDataset` has `__len__` defined.*")
+        trainer.fit(module, datamodule=data, ckpt_path=checkpoint, weights_only=checkpoint is not None)
+    if trainer.is_global_zero:
+        save_weights(folder / "weights.safetensors", model, cfg)
+        finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
+
+
+def build_data(
+    cfg: DictConfig, root: Path, model: CharNeRF, clock: RunClock, losses: WeightedLosses
+) -> MixedDataModule:
+    """The datamodule; what no loss reads is not opened."""
+    sampling = cfg.sampling
+    surface_of = _surface_of(cfg, losses)
+
+    def make_dataset(store: CharacterStore) -> MixedDataset:
+        return MixedDataset(
+            store=store,
+            surface_of=surface_of,
+            characters=cfg.scale.batch_characters,
+            foreground_share=sampling.foreground_share,
+            space_points=sampling.space_points if losses.reads("occupancy") else 0,
+            reads_depth=losses.reads("depth"),
+            seed=cfg.seed,
+        )
+
+    return MixedDataModule(
+        root=root,
+        train_splits=list(sampling.train_splits),
+        val_split=sampling.val_split,
+        val_characters=sampling.val_characters,
+        val_views=sampling.val_views,
+        carve=model.carve,
+        memory_mib=sampling.memory_mib,
+        make_dataset=make_dataset,
+        sampler=PhaseSampler(
+            schedule=build_part(cfg.schedule), position=clock.position, num_marks=sampling.num_validations
+        ),
+    )
+
+
+def _surface_of(cfg: DictConfig, losses: WeightedLosses) -> SurfaceOf:
+    """A character's surface, opened once; None without a loss that reads it or without a mesh, which is said once."""
+    make_surface: Callable[..., Any] = build_part(cfg.surface)
+    phases = cfg.schedule.phases
+    read = any(losses.reads(term) for term in SURFACE_TERMS) or any(
+        phase.get("loss_weights", {}).get(term, 0) > 0 for phase in phases for term in SURFACE_TERMS
+    )
+    told: set[str] = set()
+
+    @cache
+    def opened(path: Path) -> Any:
+        return make_surface(load_surface_mesh(path))
+
+    def surface_of(one: OpenCharacter) -> Any:
+        if not read:
+            return None
+        if one.character.mesh_file is None:
+            if not told:
+                log.warning("Character %s has no mesh: it is trained by rays alone.", one.character.name)
+                told.add(one.character.name)
+            return None
+        return opened(one.character.mesh_file)
+
+    return surface_of
+
+
+def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
+    """Lightning's trainer with our callbacks; the budget, not Lightning, bounds the run."""
+    callbacks = [
+        clock,
+        BudgetBar(clock=clock),
+        FiniteGuard(folder=folder),
+        WhiteAlarm(),
+        CurveWriter(path=folder / "curve.csv", clock=clock),
+        PictureLogger(),
+        ModelCheckpoint(
+            dirpath=folder / "checkpoints",
+            filename="best",
+            monitor="val/psnr_foreground",
+            mode="max",
+            save_last=True,
+            enable_version_counter=False,
+        ),
+    ]
+    return build_part(
+        cfg.trainer,
+        {
+            "callbacks": callbacks,
+            "logger": TensorBoardLogger(str(folder), name="", version="tensorboard", default_hp_metric=False),
+            "max_epochs": -1,
+            "num_sanity_val_steps": 0,
+            "enable_progress_bar": False,
+            "enable_model_summary": False,
+            "use_distributed_sampler": False,
+            "gradient_clip_val": cfg.sampling.gradient_clip,
+            "log_every_n_steps": 20,
+        },
+    )
+
+
+def training_renderer(cfg: DictConfig) -> AbstractRenderer:
+    """The renderer with the training's own number of coarse samples."""
+    changed = cfg.copy()
+    changed.renderer.num_coarse = cfg.scale.train_num_coarse
+    return build_renderer(changed)
+
+
+def surface_delta(cfg: DictConfig) -> float:
+    """Interval length of a surface point, m.
+
+    Source: paper, Mix of 2d ray sampling and 3d surface sampling: (z_far - z_near) / (n_coarse + n_fine), real depths.
+    """
+    return 2.0 * cfg.model.box_half_extent / (cfg.scale.train_num_coarse + cfg.renderer.num_fine)
+
+
+def find_checkpoint(ckpt_path: str | None, folder: Path) -> Path | None:
+    """The checkpoint that a run goes on from.
+
+    Args:
+        ckpt_path: None, a file, or `last`: of this run folder, else of the newest run beside it.
+        folder: The run folder.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    if ckpt_path is None:
+        return None
+    if ckpt_path != "last":
+        if Path(ckpt_path).is_file():
+            return Path(ckpt_path).resolve()
+        raise ConfigError(f"ckpt_path: found {ckpt_path!r}, which is no file; expected a .ckpt, `last` or null.")
+    own = folder / "checkpoints" / "last.ckpt"
+    others = sorted(folder.parent.glob("*/checkpoints/last.ckpt"), key=lambda path: path.stat().st_mtime)
+    if own.is_file():
+        return own
+    if others:
+        log.info("Going on from %s.", others[-1])
+        return others[-1].resolve()
+    raise ConfigError(
+        f"ckpt_path: found `last`, but no run beside {folder} has checkpoints/last.ckpt; name the .ckpt, or set "
+        "hydra.run.dir to the run to go on with."
+    )
+
+
+def log_hyperparameters(trainer: L.Trainer, cfg: DictConfig, model: CharNeRF) -> None:
+    """Write the config and the number of parameters to TensorBoard."""
+    assert trainer.logger is not None
+    values = OmegaConf.to_container(cfg, resolve=True)
+    assert isinstance(values, dict)
+    trainer.logger.log_hyperparams(
+        {**{str(k): v for k, v in values.items()}, "num_parameters": sum(p.numel() for p in model.parameters())}
+    )
+
+
+def keep_freed_memory() -> None:
+    """Let glibc keep freed memory: a training step frees and takes the same blocks again (measured: see docs).
+
+    Does nothing where the C library is another one.
+    """
+    try:
+        library = ctypes.CDLL("libc.so.6")
+    except OSError:
+        return
+    trim_threshold, top_pad, mmap_max = -1, -2, -4
+    library.mallopt(mmap_max, 0)
+    library.mallopt(trim_threshold, 1 << 30)
+    library.mallopt(top_pad, 1 << 26)
