@@ -72,6 +72,7 @@ def edges_from_t_vals(t_vals: Tensor, near: Tensor, far: Tensor) -> Tensor:
     Returns:
         t_edges, (..., S+1).
     """
+    t_vals, near, far = full_precision(t_vals), full_precision(near), full_precision(far)
     middle = 0.5 * t_vals[..., 1:] + 0.5 * t_vals[..., :-1]
     ends = t_vals.shape[:-1]
     return torch.cat((near.expand(ends)[..., None], middle, far.expand(ends)[..., None]), dim=-1)

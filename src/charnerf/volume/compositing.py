@@ -115,7 +115,7 @@ def composite(weights: Tensor, values: Tensor, background: Tensor) -> Tensor:
     """
     weights, values = full_precision(weights), full_precision(values)
     seen = (weights[..., None] * values).sum(dim=-2)
-    return seen + (1.0 - weights.sum(dim=-1))[..., None] * background
+    return seen + (1.0 - weights.sum(dim=-1))[..., None] * full_precision(background)
 
 
 def expected_depth(weights: Tensor, t_vals: Tensor, far: Tensor) -> Tensor:
@@ -133,7 +133,7 @@ def expected_depth(weights: Tensor, t_vals: Tensor, far: Tensor) -> Tensor:
     Returns:
         (...), m.
     """
-    weights, t_vals = full_precision(weights), full_precision(t_vals)
+    weights, t_vals, far = full_precision(weights), full_precision(t_vals), full_precision(far)
     moment = (weights * t_vals).sum(dim=-1) + _UNSEEN_OPACITY * far
     return moment / (weights.sum(dim=-1) + _UNSEEN_OPACITY)
 
@@ -151,5 +151,5 @@ def depth_over_background(weights: Tensor, t_vals: Tensor, far: Tensor) -> Tenso
     Returns:
         (...), m.
     """
-    weights, t_vals = full_precision(weights), full_precision(t_vals)
+    weights, t_vals, far = full_precision(weights), full_precision(t_vals), full_precision(far)
     return (weights * (t_vals - far[..., None])).sum(dim=-1) + far
