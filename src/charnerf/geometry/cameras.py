@@ -141,7 +141,13 @@ def to_camera_frame(cameras: Cameras, points: Tensor) -> Tensor:
     """World points (..., 3) in the frames of cameras whose shape broadcasts against (...)."""
     rotation = cameras.world_from_camera[..., :3, :3]
     offset = points - cameras.world_from_camera[..., :3, 3]
-    return (rotation * offset[..., :, None]).sum(-2)  # rotation transposed times offset
+    return _combine(rotation.mT, offset)
+
+
+def _combine(matrix: Tensor, vectors: Tensor) -> Tensor:
+    """Products (..., 3) of matrices and vectors as sums of columns: reducing axes of three is slow."""
+    x, y, z = vectors[..., 0, None], vectors[..., 1, None], vectors[..., 2, None]
+    return matrix[..., 0] * x + matrix[..., 1] * y + matrix[..., 2] * z
 
 
 def project(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -184,8 +190,8 @@ def pixel_rays(cameras: Cameras, pixels: Tensor) -> RayBundle:
     )
     local_origin = torch.stack((torch.where(parallel, x, zero), torch.where(parallel, y, zero), zero), dim=-1)
     rotation = cameras.world_from_camera[..., :3, :3]
-    directions = safe_normalize((rotation * local_direction[..., None, :]).sum(-1))
-    origins = cameras.world_from_camera[..., :3, 3] + (rotation * local_origin[..., None, :]).sum(-1)
+    directions = safe_normalize(_combine(rotation, local_direction))
+    origins = cameras.world_from_camera[..., :3, 3] + _combine(rotation, local_origin)
     return RayBundle(origins=origins, directions=directions)
 
 
