@@ -217,10 +217,11 @@ def _points_on_edges(triangles: np.ndarray, spacing: float) -> np.ndarray:
     """Points (n, 3), float64, so that none of the triangles' edges is farther than the spacing from one."""
     starts = triangles.reshape(-1, 3).astype(np.float64)
     ends = np.roll(triangles, -1, axis=1).reshape(-1, 3).astype(np.float64)
-    counts = np.ceil(np.linalg.norm(ends - starts, axis=-1) / spacing).astype(np.int64) + 1
+    lengths = np.linalg.norm(ends - starts, axis=-1)
+    counts = np.maximum(np.ceil(lengths / spacing), 1).astype(np.int64)  # ends are the starts of others
     edge = np.repeat(np.arange(len(starts)), counts)
     first = np.cumsum(counts) - counts
-    share = (np.arange(len(edge)) - first[edge]) / np.maximum(counts - 1, 1)[edge]
+    share = (np.arange(len(edge)) - first[edge]) / counts[edge]
     points = starts[edge] + share[:, None] * (ends - starts)[edge]
     cells = np.floor(points / spacing).astype(np.int64)
     cells -= cells.min(axis=0)

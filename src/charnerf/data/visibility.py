@@ -57,12 +57,11 @@ def capture_cameras(mesh_file: Path) -> Cameras | None:
 
 
 def default_cameras(mesh: SurfaceMesh) -> Cameras:
-    """Cameras (51,) as a capture sets them: a Fibonacci hemisphere, and level ones in front, beside, behind."""
+    """Cameras (51,) as a capture sets them: a Fibonacci hemisphere and the three source views."""
     centre = torch.tensor((0.0, 0.0, 1.0), dtype=torch.float64)
     reach = float(np.linalg.norm(mesh.triangles.reshape(-1, 3) - centre.numpy(), axis=-1).max())
-    level = direction_from_angles(
-        torch.tensor((0.0, 90.0, 180.0), dtype=torch.float64), torch.zeros(3).double()
-    )
+    azimuths = torch.tensor((0.0, 90.0, 180.0), dtype=torch.float64)
+    level = direction_from_angles(azimuths, torch.zeros_like(azimuths))
     return cameras_towards(
         torch.cat((fibonacci_hemisphere(48), level)),
         target=centre,
