@@ -27,9 +27,11 @@ class Scale:
     num_single_view_blocks: CountOrZero
     num_multi_view_blocks: CountOrZero
     num_coarse: Count
+    train_num_coarse: Count
     num_fine: CountOrZero
     phase_rays: list[Count]
     phase_surface_points: list[CountOrZero]
+    space_points: CountOrZero
     batch_characters: Count
     steps: Count | None
     seconds: Annotated[float, Above(0)] | None
@@ -42,6 +44,23 @@ class Budget:
 
     steps: Count | None
     seconds: Annotated[float, Above(0)] | None
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """What training and validation draw from the data."""
+
+    foreground_share: Annotated[float, AtLeast(0)]
+    space_points: CountOrZero
+    train_splits: list[str]
+    val_split: str
+    test_split: str
+    val_characters: Count | None
+    val_views: Count
+    num_validations: Count
+    memory_mib: Annotated[float, Above(0)]
+    final_rate: Annotated[float, AtLeast(0)]
+    gradient_clip: Annotated[float, Above(0)] | None
 
 
 @dataclass(frozen=True)
@@ -74,6 +93,8 @@ class RunConfig:
     features: _part("charnerf.models.features")  # type: ignore[valid-type]
     quadrature: _part("charnerf.volume.quadrature")  # type: ignore[valid-type]
     renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
+    sampling: Sampling
+    surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
     loss: _part("charnerf.losses")  # type: ignore[valid-type]
     schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
     data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
