@@ -1,14 +1,31 @@
 """The library's two objects: a loaded `Model`, and a `Hero`, one character encoded from its drawings."""
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, final
+from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, final
+
+import numpy as np
 import torch
 
-from charnerf.models.charnerf import CharNeRF, EncodedViews
-from charnerf.types import Scene, SourceViews
+from charnerf.drawings.turnaround import Turnaround, read_turnaround
+from charnerf.errors import ConfigError, ShapeError
+from charnerf.geometry.cameras import cameras_towards, direction_from_angles
+from charnerf.meshing.build import BuiltMesh, build_mesh
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import Cameras, Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
+
+if TYPE_CHECKING:
+    import trimesh
+
+HEIGHT = 2.0  # metres, of every character
+CENTRE = (0.0, 0.0, 0.5 * HEIGHT)
+LEAST_DISTANCE = 4.0  # metres, of a camera from the centre
+MARGIN = 1.05  # of a picture's half-extent over the character's radius
+Picture = str | Path | np.ndarray
 
 
 @final
@@ -33,12 +50,50 @@ class Model:
         """Side of the drawings that the encoder was trained on, pixels."""
         return int(self.config.scale.image_size)
 
-    def encode_views(self, views: SourceViews) -> "Hero":
-        """Encode source views of one character, B = 1, that have their cameras already."""
+    @property
+    def device(self) -> torch.device:
+        """Where the networks are."""
+        return self.network.box[0].device
+
+    def to(self, device: torch.device | str) -> Model:
+        """The model on another device; the networks move, they are not copied."""
+        return replace(self, network=self.network.to(device))
+
+    def encode(
+        self, *, front: Picture, side: Picture, back: Picture, side_is: Literal["left", "right"] = "left"
+    ) -> Hero:
+        """Encode one character from three drawings.
+
+        Args:
+            front: Image file, or array (H, W, 3 or 4) of uint8 or of floats in [0, 1]; alpha or a plain
+                background; any size.
+            side: In profile.
+            back: Seen from behind.
+            side_is: Which side of the character the side drawing shows; left: the face looks to the picture's
+                left.
+
+        Returns:
+            The character; `hero.turnaround` says what was assumed about the drawings.
+
+        Raises:
+            DataError: If a drawing can not be used; the message names its file.
+        """
+        turnaround = read_turnaround(front, side, back, size=self.image_size, side_is=side_is)
+        return replace(self.encode_views(turnaround.views), turnaround=turnaround)
+
+    def encode_views(self, views: SourceViews) -> Hero:
+        """Encode source views of one character, B = 1, that have their cameras already.
+
+        Raises:
+            ShapeError: If there is not exactly one character.
+        """
+        if views.images.shape[0] != 1:
+            raise ShapeError(
+                f"views: found {views.images.shape[0]} characters, expected 1; encode them one by one."
+            )
         with torch.no_grad():
-            encoded = self.network.encode(views)
-            scene = self.network.scene(encoded, 0)
-        return Hero(scene=scene, views=views, encoded=encoded, renderer=self.renderer)
+            scene = self.network.scene(self.network.encode(views.to(self.device)), 0)
+        return Hero(scene=scene, views=views, renderer=self.renderer)
 
 
 @final
@@ -49,11 +104,96 @@ class Hero:
     Attributes:
         scene: Its field.
         views: The drawings as source views, B = 1.
-        encoded: What the encoder made of them.
         renderer: How it is rendered.
+        turnaround: What was assumed about the drawings; None where the views came with cameras.
     """
 
     scene: Scene
     views: SourceViews
-    encoded: EncodedViews
     renderer: AbstractRenderer
+    turnaround: Turnaround | None = None
+
+    def render(self, *, azimuth_deg: float, elevation_deg: float = 0.0, size: int = 256) -> np.ndarray:
+        """Render a view.
+
+        Args:
+            azimuth_deg: 0 front, 90 the character's left side, 180 back, 270 its right side.
+            elevation_deg: 0 level, 90 from above.
+            size: Side of the picture, pixels.
+
+        Returns:
+            (size, size, 4), float32 RGBA in [0, 1], sRGB-encoded, straight alpha.
+
+        Raises:
+            ConfigError: If the size is below 1 or an angle is not finite.
+        """
+        if size < 1:
+            raise ConfigError(f"size: found {size}, expected at least 1 pixel.")
+        if not np.isfinite((azimuth_deg, elevation_deg)).all():
+            raise ConfigError(f"angles: found {azimuth_deg} and {elevation_deg}, expected finite degrees.")
+        finest = self.renderer.render_camera(
+            self.scene, self._camera(azimuth_deg, elevation_deg, size)
+        ).finest
+        opacity = finest.opacity.clamp(0.0, 1.0)[..., None]
+        seen = finest.rgb - (1.0 - opacity)  # the background is white
+        straight = torch.where(opacity > 1e-4, seen / opacity.clamp_min(1e-4), torch.ones_like(seen))
+        return torch.cat((straight.clamp(0.0, 1.0), opacity), dim=-1).cpu().numpy()
+
+    def mesh(
+        self, *, resolution: int = 256, num_cameras: int = 8, faces: int | None = None
+    ) -> trimesh.Trimesh:
+        """Make a coloured mesh: world frame, metres, 2 m tall on z = 0; write it with `charnerf.save_mesh`.
+
+        Args:
+            resolution: Grid points along the longest side.
+            num_cameras: Cameras whose directions the density is averaged over (one where the density sees no
+                direction).
+            faces: Faces after decimation; None keeps all.
+        """
+        return self.build_mesh(resolution=resolution, num_cameras=num_cameras, faces=faces).mesh
+
+    def build_mesh(
+        self,
+        *,
+        resolution: int,
+        num_cameras: int,
+        faces: int | None,
+        on_points: Callable[[int], object] = lambda count: None,
+    ) -> BuiltMesh:
+        """As `mesh`, with how it came about: level, parts dropped, work left out, seconds."""
+        with torch.no_grad():
+            return build_mesh(
+                self.scene,
+                self.views.to(self.scene.box_min.device),
+                resolution=resolution,
+                num_cameras=num_cameras,
+                faces=faces,
+                height=HEIGHT,
+                on_points=on_points,
+            )
+
+    def radius(self) -> float:
+        """Radius around (0, 0, 1) that pictures frame, m: of the hull with a margin, at least 1.05 m."""
+        hull, box_min = self.scene.hull, self.scene.box_min
+        if hull is None:
+            return float((self.scene.box_max - box_min).amax()) / 2.0
+        occupied = hull.occupancy.nonzero()
+        if len(occupied) == 0:
+            return MARGIN
+        cell = (hull.box_max - hull.box_min) / torch.tensor(hull.occupancy.shape, device=box_min.device)
+        centres = hull.box_min + (occupied + 0.5) * cell
+        return MARGIN * max(1.0, float((centres - box_min.new_tensor(CENTRE)).norm(dim=-1).max()))
+
+    def _camera(self, azimuth_deg: float, elevation_deg: float, size: int) -> Cameras:
+        """Pinhole camera of shape () that frames the character."""
+        device, radius = self.scene.box_min.device, self.radius()
+        angles = torch.tensor([azimuth_deg, elevation_deg], dtype=torch.float64, device=device)
+        camera = cameras_towards(
+            direction_from_angles(angles[0], angles[1])[None],
+            target=torch.tensor(CENTRE, dtype=torch.float64, device=device),
+            distance=max(LEAST_DISTANCE, 2.5 * radius),
+            half_extent=radius,
+            size=size,
+            orthographic=False,
+        )
+        return camera.to(torch.float32)[0]

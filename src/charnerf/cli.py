@@ -1,0 +1,335 @@
+"""The command `charnerf`: options and help here, the work in `charnerf.commands`, imported when one runs.
+
+Exit status: 0 done, 1 failed, 2 wrong call. Errors are one message; `--debug` anywhere shows the traceback.
+"""
+
+import sys
+import traceback
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from charnerf.errors import CharNeRFError, ConfigError
+
+FAILED, WRONG_CALL = 1, 2
+DEBUG_NOTE = "Exit status: 0 done, 1 failed, 2 wrong call. --debug shows the traceback of an error."
+
+app = typer.Typer(
+    name="charnerf",
+    help="Turnaround drawings (front, side, back) to a radiance field, novel views and a mesh.",
+    epilog=DEBUG_NOTE,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Weights = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="RUN_OR_WEIGHTS",
+        exists=True,
+        help="A run folder, a .ckpt or a .safetensors; the released weights if left out.",
+    ),
+]
+WeightsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--weights",
+        metavar="RUN_OR_WEIGHTS",
+        exists=True,
+        help="A run folder, a .ckpt or a .safetensors; the released weights if left out.",
+    ),
+]
+Dataset = Annotated[
+    Path,
+    typer.Option("--data", metavar="DATASET", exists=True, file_okay=False, help="Folder with dataset.json."),
+]
+Folder = Annotated[
+    Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="Folder to write to.")
+]
+NewDataset = Annotated[
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="DATASET", file_okay=False, help="Data set to write, or to add to."
+    ),
+]
+Device = Annotated[str, typer.Option(help="auto, cpu, cuda, cuda:1, ..: auto takes a GPU if there is one.")]
+Trusted = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust", metavar="MODULE", help="Module of your own classes that the run's config may name."
+    ),
+]
+Views = Annotated[
+    int, typer.Option(min=1, help="Target pictures a character, spread over the upper hemisphere.")
+]
+Size = Annotated[int, typer.Option(min=8, max=4096, help="Side of every picture, pixels.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; one a core if left out.")]
+Sources = Annotated[
+    Literal["orthographic", "pinhole"], typer.Option(help="Projection of the front, side and back views.")
+]
+Depth = Annotated[bool, typer.Option("--depth", help="Write depth pictures too (16 bit, mm).")]
+
+
+@app.callback()
+def _options(
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show the traceback of an error; also after the command.")
+    ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Turnaround drawings (front, side, back) to a radiance field, novel views and a mesh."""
+
+
+@app.command(epilog=DEBUG_NOTE)
+def capture(
+    meshes: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="MESH...", exists=True, help="GLB, glTF, OBJ, PLY, STL files, or folders of them."
+        ),
+    ],
+    output: NewDataset,
+    *,
+    split: Annotated[
+        str, typer.Option(metavar="NAME", help="Split that gets all given characters.")
+    ] = "train",
+    views: Views = 48,
+    size: Size = 128,
+    up: Annotated[
+        Literal["y", "z"] | None,
+        typer.Option(help="Up axis of the files. Default: y for GLB, glTF, OBJ; z for PLY, STL."),
+    ] = None,
+    facing: Annotated[
+        Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None,
+        typer.Option(help="Axis that the characters face. Default: +z for GLB, glTF, OBJ; -y for PLY, STL."),
+    ] = None,
+    sources: Sources = "orthographic",
+    light: Annotated[
+        Literal["unlit", "headlight"], typer.Option(help="Texture colours as they are, or shaded.")
+    ] = "unlit",
+    depth: Depth = False,
+    jobs: Jobs = None,
+) -> None:
+    """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
+
+    Every character is brought to 2 m height with its feet on the floor; its name is its file's stem, and one
+    that is in the data set already is refused. Exit status 1 if a mesh could not be captured; the others are.
+    """
+    from charnerf import commands
+
+    commands.capture(
+        meshes,
+        output,
+        split=split,
+        views=views,
+        size=size,
+        up=up,
+        facing=facing,
+        sources=sources,
+        light=light,
+        depth=depth,
+        jobs=jobs,
+    )
+
+
+@app.command(epilog=DEBUG_NOTE)
+def generate(
+    output: NewDataset,
+    *,
+    train: Annotated[int, typer.Option(min=0, help="Characters of the train split.")] = 32,
+    val: Annotated[int, typer.Option(min=0, help="Characters of the val split.")] = 4,
+    test: Annotated[int, typer.Option(min=0, help="Characters of the test split.")] = 6,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same characters.")] = 0,
+    views: Views = 48,
+    size: Size = 128,
+    jobs: Jobs = None,
+) -> None:
+    """Write the embedded characters of `data=procedural` as a data set."""
+    from charnerf import commands
+
+    commands.generate(output, train=train, val=val, test=test, seed=seed, views=views, size=size, jobs=jobs)
+
+
+@app.command(epilog=DEBUG_NOTE)
+def evaluate(
+    *,
+    data: Dataset,
+    weights: Weights = None,
+    split: Annotated[str, typer.Option(metavar="NAME", help="Split to measure on.")] = "test",
+    views: Annotated[str, typer.Option(metavar="N|all", help="Fixed views a character.")] = "24",
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", dir_okay=False, help="Write the metrics there as well."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="DIR", file_okay=False, help="Keep predictions and a report there."
+        ),
+    ] = None,
+    renderer: Annotated[
+        Literal["culled", "dense"] | None,
+        typer.Option(help="Another renderer than the model was trained with."),
+    ] = None,
+    mesh: Annotated[bool, typer.Option(help="Make every mesh, for Chamfer and F-score.")] = True,
+    resolution: Annotated[
+        int, typer.Option(min=16, max=1024, help="Grid points along a mesh's longest side.")
+    ] = 128,
+    baselines: Annotated[
+        bool, typer.Option(help="Measure white and the visual hull beside the model.")
+    ] = True,
+    device: Device = "auto",
+    trust: Trusted = None,
+) -> None:
+    """Measure a model on a split: PSNR, SSIM, LPIPS, FLIP, IoU, Chamfer, F-score, by angle, with seconds.
+
+    Prints metrics.json.
+    """
+    from charnerf import commands
+
+    commands.evaluate(
+        weights,
+        data,
+        split=split,
+        views=views,
+        json_file=json_file,
+        output=output,
+        renderer=renderer,
+        resolution=resolution if mesh else None,
+        baselines=baselines,
+        device=device,
+        trust=trust or [],
+    )
+
+
+@app.command(epilog=DEBUG_NOTE)
+def mesh(
+    *,
+    data: Dataset,
+    character: Annotated[str, typer.Option(metavar="NAME", help="Character of the data set.")],
+    output: Folder,
+    weights: Weights = None,
+    resolution: Annotated[
+        int, typer.Option(min=16, max=1024, help="Grid points along the longest side.")
+    ] = 128,
+    cameras: Annotated[
+        int, typer.Option(min=1, help="Cameras whose directions the density is averaged over.")
+    ] = 8,
+    faces: Annotated[int | None, typer.Option(min=4, help="Faces after decimation; all if left out.")] = None,
+    format_: Annotated[
+        Literal["glb", "gltf", "obj", "ply", "stl"], typer.Option("--format", help="File format of the mesh.")
+    ] = "glb",
+    device: Device = "auto",
+    trust: Trusted = None,
+) -> None:
+    """Make the mesh of one character of a data set: DIR/NAME.glb, vertex colours, metres."""
+    from charnerf import commands
+
+    commands.mesh(
+        weights,
+        data,
+        character,
+        output,
+        resolution=resolution,
+        cameras=cameras,
+        faces=faces,
+        suffix=format_,
+        device=device,
+        trust=trust or [],
+    )
+
+
+@app.command(epilog=DEBUG_NOTE)
+def reconstruct(
+    front: Annotated[
+        Path, typer.Argument(metavar="FRONT", exists=True, dir_okay=False, help="Front view, an image.")
+    ],
+    side: Annotated[Path, typer.Argument(metavar="SIDE", exists=True, dir_okay=False, help="Side view.")],
+    back: Annotated[Path, typer.Argument(metavar="BACK", exists=True, dir_okay=False, help="Back view.")],
+    *,
+    output: Folder,
+    weights: WeightsOption = None,
+    side_shows: Annotated[
+        Literal["left", "right"],
+        typer.Option(
+            "--side",
+            help="Which side of the character SIDE shows; left: its face looks to the picture's left.",
+        ),
+    ] = "left",
+    resolution: Annotated[
+        int, typer.Option(min=16, max=1024, help="Grid points along the mesh's longest side.")
+    ] = 128,
+    faces: Annotated[int, typer.Option(min=4, help="Faces of the mesh after decimation.")] = 8000,
+    frames: Annotated[int, typer.Option(min=1, help="Frames of the turntable.")] = 36,
+    size: Size = 256,
+    cameras: Annotated[
+        int, typer.Option(min=1, help="Cameras whose directions the density is averaged over.")
+    ] = 8,
+    device: Device = "auto",
+    trust: Trusted = None,
+) -> None:
+    """Turn three drawings into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.md.
+
+    The images have alpha or a plain background, any sizes and crops: figures are cut out and brought to one
+    height and floor line. What was assumed is printed, and drawn in the report.
+    """
+    from charnerf.commands import load_model, say
+    from charnerf.reconstruction import reconstruct as run_reconstruction
+
+    done = run_reconstruction(
+        load_model(weights, device=device, trust=trust or []),
+        front=front,
+        side=side,
+        back=back,
+        output=output,
+        side_is=side_shows,
+        resolution=resolution,
+        faces=faces,
+        frames=frames,
+        size=size,
+        num_cameras=cameras,
+    )
+    say(f"{done.mesh}, {done.turntable}, {done.report}")
+
+
+@app.command(epilog=DEBUG_NOTE)
+def report(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", exists=True, file_okay=False, help="Runs lie below it.")
+    ],
+) -> None:
+    """Write FOLDER/report.md and FOLDER/report.html over all runs below a folder."""
+    from charnerf import commands
+
+    commands.report(folder)
+
+
+def main() -> None:
+    """Run a command and leave with its exit status."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command line and return its exit status."""
+    debug = "--debug" in arguments
+    arguments = [one for one in arguments if one != "--debug"]
+    if "--version" in arguments[:1]:
+        from charnerf import __version__
+
+        print(f"charnerf {__version__}")
+        return 0
+    try:
+        app(arguments)  # leaves by SystemExit, also for wrong options (2) and Ctrl-C (1)
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else FAILED if leaving.code else 0
+    except (CharNeRFError, OSError, MemoryError) as error:
+        if debug:
+            traceback.print_exc()
+        print(f"error: {error}", file=sys.stderr)
+        return WRONG_CALL if isinstance(error, ConfigError) else FAILED
+    return 0

@@ -1,0 +1,179 @@
+"""What the commands of `charnerf` do; `charnerf.cli` reads their options."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import torch
+from omegaconf import OmegaConf
+
+from charnerf import runs
+from charnerf.capture.dataset import capture_dataset
+from charnerf.capture.embree import CaptureOptions
+from charnerf.capture.lights import Headlight, Unlit
+from charnerf.data.characters import load_character
+from charnerf.errors import ConfigError, DataError
+from charnerf.evaluation.evaluate import evaluate as evaluate_split
+from charnerf.evaluation.evaluate import write_metrics
+from charnerf.evaluation.folder_report import write_folder_report
+from charnerf.evaluation.report import write_run_report
+from charnerf.meshing.build import build_mesh
+from charnerf.meshing.export import save_mesh
+from charnerf.model_api import Model
+
+LIGHTS = {"unlit": Unlit, "headlight": Headlight}
+RENDERERS = {
+    "culled": "charnerf.volume.renderers.culled.CulledRenderer",
+    "dense": "charnerf.volume.renderers.dense.DenseRenderer",
+}
+
+
+def say(text: str) -> None:
+    """Tell the user, beside what a command prints for programs."""
+    sys.stderr.write(f"{text}\n")
+
+
+def load_model(path: Path | None, *, device: str, trust: Sequence[str], renderer: str | None = None) -> Model:
+    """Load a model onto a device, with its own renderer or another one of the same settings."""
+    model = runs.load(path, trusted_targets=trust).to(pick_device(device))
+    if renderer is None:
+        return model
+    changed = OmegaConf.merge(model.config, {"renderer": {"_target_": RENDERERS[renderer]}})
+    return replace(model, renderer=runs.build_renderer(changed))  # type: ignore[arg-type]
+
+
+def pick_device(name: str) -> torch.device:
+    """Device of a name; `auto` is a GPU if there is one.
+
+    Raises:
+        ConfigError: If there is no such device.
+    """
+    if name == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        device = torch.device(name)
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        raise ConfigError(
+            f"--device: found '{name}', expected auto, cpu or a GPU of this machine."
+        ) from error
+    return device
+
+
+def capture(
+    meshes: Sequence[Path],
+    output: Path,
+    *,
+    split: str,
+    views: int,
+    size: int,
+    up: str | None,
+    facing: str | None,
+    sources: str,
+    light: str,
+    depth: bool,
+    jobs: int | None,
+) -> None:
+    """Capture meshes into a data set.
+
+    Raises:
+        DataError: After all others are done, if some could not be captured.
+    """
+    options = CaptureOptions(views=views, size=size, sources=sources, depth=depth, light=LIGHTS[light]())  # type: ignore[arg-type]
+    done = capture_dataset(meshes, output, split, options=options, up=up, facing=facing, processes=jobs)
+    say(f"{len(done.captured)} characters captured into {output}, split {split}.")
+    if done.failed:
+        raise DataError(f"{len(done.failed)} meshes could not be captured:\n  " + "\n  ".join(done.failed))
+
+
+def generate(
+    output: Path, *, train: int, val: int, test: int, seed: int, views: int, size: int, jobs: int | None
+) -> None:
+    """Write the embedded characters."""
+    from charnerf.capture.procedural.dataset import generate_dataset
+
+    if train + val + test == 0:
+        raise ConfigError("--train, --val, --test: found 0 each, expected at least one character.")
+    generate_dataset(output, train, val, test, seed, views=views, size=size, processes=jobs)
+    say(f"{train + val + test} characters are in {output}.")
+
+
+def evaluate(
+    weights: Path | None,
+    data: Path,
+    *,
+    split: str,
+    views: str,
+    json_file: Path | None,
+    output: Path | None,
+    renderer: str | None,
+    resolution: int | None,
+    baselines: bool,
+    device: str,
+    trust: Sequence[str],
+) -> None:
+    """Measure a model on a split and print the metrics as JSON."""
+    if views != "all" and not (views.isdigit() and int(views) >= 1):
+        raise ConfigError(f"--views: found '{views}', expected a number from 1 on, or all.")
+    model = load_model(weights, device=device, trust=trust, renderer=renderer)
+    if output is not None:
+        output.mkdir(parents=True, exist_ok=True)
+    metrics = evaluate_split(
+        model.network,
+        model.renderer,
+        data,
+        split,
+        views="all" if views == "all" else int(views),
+        output=output,
+        mesh=None if resolution is None else partial(build_mesh, resolution=resolution),
+        device=model.device,
+        baselines=baselines,
+        train_seconds=train_seconds(model.source),
+    )
+    if output is not None:
+        write_metrics(output / "metrics.json", metrics)
+        say(f"report: {write_run_report(output)}")
+    if json_file is not None:
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        write_metrics(json_file, metrics)
+    sys.stdout.write(json.dumps(metrics, indent=2) + "\n")
+
+
+def train_seconds(weights: Path) -> float | None:
+    """Training time that the run of some weights noted, None where there is none."""
+    for folder in (weights.parent, weights.parent.parent):
+        try:
+            return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["seconds"]["train"]
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+    return None
+
+
+def mesh(
+    weights: Path | None,
+    data: Path,
+    character: str,
+    output: Path,
+    *,
+    resolution: int,
+    cameras: int,
+    faces: int | None,
+    suffix: str,
+    device: str,
+    trust: Sequence[str],
+) -> None:
+    """Write the mesh of one character of a data set."""
+    model = load_model(weights, device=device, trust=trust)
+    hero = model.encode_views(load_character(data, character).sources)
+    built = hero.build_mesh(resolution=resolution, num_cameras=cameras, faces=faces)
+    output.mkdir(parents=True, exist_ok=True)
+    path = save_mesh(built.mesh, output / f"{character}.{suffix}")
+    say(f"{path}: {len(built.mesh.faces)} faces, level {built.level:.1f} 1/m, {built.seconds:.1f} s.")
+
+
+def report(folder: Path) -> None:
+    """Write the report over all runs below a folder."""
+    say(f"report: {write_folder_report(folder)}")
