@@ -22,7 +22,8 @@ def box_interval(rays: RayBundle, box_min: Tensor, box_max: Tensor) -> tuple[Ten
     Returns:
         near and far, (...), m, near >= 0; a ray that misses has near == far (finite).
     """
-    parallel = rays.directions == 0
+    # slopes below the smallest normal number have no finite inverse and move no ray that fits into the dtype
+    parallel = rays.directions.abs() < 4.0 * torch.finfo(rays.directions.dtype).tiny
     inverse = 1.0 / torch.where(parallel, torch.ones_like(rays.directions), rays.directions)
     first, second = (box_min - rays.origins) * inverse, (box_max - rays.origins) * inverse
     inside = (rays.origins >= box_min) & (rays.origins <= box_max)
