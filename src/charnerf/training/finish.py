@@ -13,7 +13,7 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.report import write_run_report
-from charnerf.meshing.build import build_mesh
+from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import Scene, SourceViews
@@ -45,8 +45,8 @@ def finish_run(
     """
     device = next(model.parameters()).device
 
-    def make_mesh(scene: Scene, views: SourceViews) -> object:
-        return build_mesh(scene, views, resolution=MESH_RESOLUTION).mesh
+    def make_mesh(scene: Scene, views: SourceViews) -> BuiltMesh:
+        return build_mesh(scene, views, resolution=MESH_RESOLUTION)
 
     metrics = evaluate(
         model,
