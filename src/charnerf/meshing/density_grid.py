@@ -209,13 +209,14 @@ class GridSampler:
         entered = np.zeros_like(done)
         for axis in range(3):
             # extremes over the face between block i and i + 1 along the axis
-            faces = np.take(above, np.arange(0, self.shape[axis], BLOCK), axis=axis)
-            any_above, all_above = faces, faces
+            faces: np.ndarray = np.take(above, np.arange(0, self.shape[axis], BLOCK), axis=axis)
+            some: np.ndarray = faces
+            every: np.ndarray = faces
             for other in range(3):
                 if other != axis:
-                    any_above = _windows(any_above, BLOCK, other).any(-1)
-                    all_above = _windows(all_above, BLOCK, other).all(-1)
-            crossed = np.moveaxis(any_above & ~all_above, axis, 0)[1:-1]
+                    some = np.any(_windows(some, BLOCK, other), axis=-1)
+                    every = np.all(_windows(every, BLOCK, other), axis=-1)
+            crossed = np.moveaxis(some & ~every, axis, 0)[1:-1]
             blocks, result = np.moveaxis(done, axis, 0), np.moveaxis(entered, axis, 0)
             result[1:] |= crossed & blocks[:-1]
             result[:-1] |= crossed & blocks[1:]

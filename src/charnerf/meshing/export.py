@@ -9,6 +9,7 @@ import trimesh
 
 from charnerf.errors import DataError
 from charnerf.meshing.axes import vertices_for
+from charnerf.meshing.extract import vertex_colours
 from charnerf.meshing.gltf import encode_glb, encode_gltf
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -64,7 +65,7 @@ def write_aside(path: Path, content: bytes) -> None:
 def _encode(mesh: trimesh.Trimesh, suffix: str, name: str) -> bytes:
     """The file's bytes."""
     vertices = vertices_for(suffix, mesh.vertices)
-    rgba = np.asarray(mesh.visual.vertex_colors) if mesh.visual.kind == "vertex" else None
+    rgba = vertex_colours(mesh)
     if suffix in (".glb", ".gltf"):
         encode = encode_glb if suffix == ".glb" else encode_gltf
         normals = vertices_for(suffix, mesh.vertex_normals)
@@ -73,4 +74,4 @@ def _encode(mesh: trimesh.Trimesh, suffix: str, name: str) -> bytes:
     if rgba is not None and suffix != ".stl":
         turned.visual = trimesh.visual.ColorVisuals(turned, vertex_colors=rgba)
     content = turned.export(file_type=suffix[1:])
-    return content.encode() if isinstance(content, str) else content
+    return content.encode() if isinstance(content, str) else bytes(content)  # type: ignore[arg-type]

@@ -138,8 +138,22 @@ def drop_floaters(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, int, int]:
         near = share >= KEPT_SPECK and float(tree.query(part.vertices)[0].min()) <= KEPT_DISTANCE
         if share >= KEPT_SHARE or near:
             kept.append(part)
-    result = trimesh.util.concatenate(kept) if len(kept) > 1 else kept[0]
-    return result, len(solid) - len(kept), len(parts) - len(solid)
+    return _joined(kept), len(solid) - len(kept), len(parts) - len(solid)
+
+
+def _joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """One mesh of several parts, without colours."""
+    offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    faces = np.concatenate([part.faces + offset for part, offset in zip(parts, offsets, strict=True)])
+    return trimesh.Trimesh(np.concatenate([part.vertices for part in parts]), faces, process=False)
+
+
+def vertex_colours(mesh: trimesh.Trimesh) -> np.ndarray | None:
+    """RGBA uint8 (P, 4) of a mesh whose vertices are coloured, else None."""
+    visual = mesh.visual
+    if isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "vertex":
+        return np.asarray(visual.vertex_colors)
+    return None
 
 
 def simplify(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
@@ -162,9 +176,10 @@ def simplify(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     )[:2]
     result = trimesh.Trimesh(np.asarray(points, np.float64), triangles, process=False)
     result.remove_unreferenced_vertices()
-    if mesh.visual.kind == "vertex":
+    colours = vertex_colours(mesh)
+    if colours is not None:
         nearest = cKDTree(mesh.vertices).query(result.vertices)[1]
-        result.visual = trimesh.visual.ColorVisuals(result, vertex_colors=mesh.visual.vertex_colors[nearest])
+        result.visual = trimesh.visual.ColorVisuals(result, vertex_colors=colours[nearest])
     return result
 
 

@@ -1,0 +1,88 @@
+"""The report of a reconstruction: what was assumed, what was made, how long it took."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import trimesh
+
+from charnerf.drawings.turnaround import Turnaround
+from charnerf.meshing.build import BuiltMesh
+
+ROWS_OF_LEVELS = 8
+
+
+def report_text(
+    *,
+    drawings: Turnaround,
+    built: BuiltMesh,
+    film: Path,
+    film_note: str | None,
+    views: Sequence[Path],
+    seconds: dict[str, float],
+    weights: str,
+) -> str:
+    """The Markdown text of report.md; the files that it shows lie beside it.
+
+    Args:
+        drawings: What was assumed.
+        built: The mesh.
+        film: The turntable's file.
+        film_note: What is to be said about it, or None.
+        views: Pictures, shown in the report's order.
+        seconds: By stage.
+        weights: Where the model came from.
+    """
+    lines = ["# Reconstructed character", "", " ".join(_picture(view) for view in views[:4]), ""]
+    lines += ["## What was assumed about the drawings", ""]
+    lines += ["![the drawings, cut out and aligned](drawings.png)", ""]
+    lines += [f"- {one}" for one in drawings.assumptions]
+    lines += [f"- **warning**: {one}" for one in drawings.warnings]
+    lines += ["", "## Files", ""]
+    lines += [f"- [mesh.glb](mesh.glb): {_mesh_words(built.mesh)}; vertex colours, metres, Y up, facing +Z"]
+    lines += [f"- [{film.name}]({film.name}){': ' + film_note if film_note else ''}"]
+    lines += ["- [views](views): pictures with alpha, named by azimuth in degrees", ""]
+    lines += _mesh_lines(built)
+    lines += ["", "## Seconds", "", "| stage | seconds |", "|---|---|"]
+    lines += [f"| {stage} | {value:.1f} |" for stage, value in seconds.items()]
+    lines += ["", f"Weights: {weights}", ""]
+    return "\n".join(lines)
+
+
+def _picture(view: Path) -> str:
+    return f"![{view.stem} degrees]({view.parent.name}/{view.name})"
+
+
+def _mesh_words(mesh: trimesh.Trimesh) -> str:
+    width, depth, height = mesh.extents
+    closed = "closed" if mesh.is_watertight else "not closed"
+    size = f"{width:.2f} x {depth:.2f} x {height:.2f} m"
+    return f"{len(mesh.vertices)} vertices, {len(mesh.faces)} faces, {closed}, {size}"
+
+
+def _mesh_lines(built: BuiltMesh) -> list[str]:
+    """How the mesh came about."""
+    share = built.left_out.shares()["grid_cells"] or 0.0
+    lines = [
+        "## Mesh",
+        "",
+        f"- Surface where the density is {built.level:.3g} per metre; Euler number "
+        f"{built.mesh.euler_number}.",
+        f"- {100 * share:.1f} % of the grid's points were left out: outside the hull or away from the "
+        f"surface.",
+        f"- {built.num_floaters} loose parts and {built.num_cavities} hidden cavities were dropped.",
+        f"- {built.num_extracted} faces before decimation.",
+    ]
+    if built.choice is None:
+        return [*lines, "- The density was given, not chosen."]
+    lines += [
+        "",
+        "The density was chosen by silhouettes, IoU with those of the pictures rendered from around",
+    ]
+    lines += ["and with the drawings':", "", "| density | rendered | drawings |", "|---|---|---|"]
+    tried = built.choice.tried
+    step = max(1, len(tried) // ROWS_OF_LEVELS)
+    for index, (level, rendered, drawn) in enumerate(tried):
+        if index % step == 0 or level == built.level:
+            mark = "**" if level == built.level else ""
+            lines.append(f"| {mark}{level:.3g}{mark} | {rendered:.3f} | {drawn:.3f} |")
+    return lines
