@@ -2,19 +2,22 @@
 
 import multiprocessing
 import os
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import torch
 import trimesh
 from tqdm import tqdm
 
 from charnerf.capture.embree import CaptureOptions, capture_character
-from charnerf.capture.meshes import SUFFIXES, axes_rotation, load_scene
+from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
 from charnerf.data.mesh_files import write_surface_mesh
@@ -60,26 +63,33 @@ def capture_dataset(
 
     Raises:
         DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set.
+        ConfigError: Before any work, if up and facing are no axes.
     """
     options = options or CaptureOptions()
     files = expand_mesh_paths(mesh_paths)
     root = Path(root)
     check_name("split", split)
-    if up is not None and facing is not None:
-        axes_rotation(up, facing)
+    for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
+        axes_rotation(*file_axes(suffix, up, facing))
     refuse_taken_names(open_or_new(root), [file.stem for file in files])
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
     work = partial(_capture_file, root=root, options=options, up=up, facing=facing)
     messages: dict[Path, str | None] = {}
-    with tqdm(total=len(files), desc="capture", unit="character", dynamic_ncols=True) as bar:
-        for file, message in _run(work, files, processes):
-            messages[file] = message
-            if message is None:
-                add_to_split(root, split, [file.stem], made_by=made_by(options))
-            else:
-                bar.write(f"not captured: {message}")
-            bar.update()
+    facts = made_by(options)
+    try:
+        with tqdm(total=len(files), desc="capture", unit="character", dynamic_ncols=True) as bar:
+            for file, message in _run(work, files, processes):
+                if message is None:
+                    add_to_split(root, split, [file.stem], made_by=facts)
+                else:
+                    bar.write(f"not captured: {message}")
+                messages[file] = message
+                bar.update()
+    finally:  # interrupted: what was written meanwhile belongs to the data set too
+        unlisted = [file.stem for file in files if file not in messages and (root / file.stem).is_dir()]
+        if unlisted:
+            add_to_split(root, split, unlisted, made_by=facts)
     return CaptureReport(
         captured=tuple(file.stem for file in files if messages[file] is None),
         failed=tuple(message for file in files if (message := messages[file]) is not None),
@@ -155,20 +165,27 @@ def _run(
             yield file, work(file)
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_one_thread) as pool:
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker) as pool:
         waiting = {pool.submit(work, file): file for file in files}
         try:
             for done in as_completed(waiting):
                 yield waiting[done], done.result()
+        except BrokenProcessPool as err:
+            raise DataError(
+                "capture: a worker process died, perhaps for want of memory; what was captured is kept, "
+                "run it again for the rest with fewer processes."
+            ) from err
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
-def _one_thread() -> None:
-    import torch
-
+def _begin_worker() -> None:
+    """Use one thread, and end with the parent even if that is killed."""
     torch.set_num_threads(1)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
 
 
 def _capture_file(

@@ -14,6 +14,7 @@ from charnerf.data.color import srgb_from_linear
 from charnerf.data.raycast import Hits, RayCaster
 from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface_mesh import SurfaceMesh, shade, texture_levels, triangle_normals
+from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import (
     cameras_towards,
     direction_from_angles,
@@ -48,6 +49,18 @@ class CaptureOptions:
     light: AbstractLight = field(default_factory=Unlit)
     subsamples: int = 3
     edge_subsamples: int = 6
+
+    def __post_init__(self) -> None:
+        """Check the options.
+
+        Raises:
+            ConfigError: If one is out of its range.
+        """
+        for name, least in (("views", 1), ("size", 8), ("subsamples", 1), ("edge_subsamples", 1)):
+            if getattr(self, name) < least:
+                raise ConfigError(f"{name}: found {getattr(self, name)}, expected at least {least}.")
+        if self.sources not in ("orthographic", "pinhole"):
+            raise ConfigError(f"sources: found {self.sources!r}, expected 'orthographic' or 'pinhole'.")
 
 
 @dataclass(frozen=True)

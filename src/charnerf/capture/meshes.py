@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from charnerf.data.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
-from charnerf.errors import DataError
+from charnerf.errors import ConfigError, DataError
 
 HEIGHT = 2.0
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -47,7 +47,7 @@ def load_scene(path: str | Path, up: str | None = None, facing: str | None = Non
         )
     if not path.is_file():
         raise DataError(f"{path}: no such file, expected a mesh.")
-    rotation = axes_rotation(*_axes(path, up, facing))
+    rotation = axes_rotation(*file_axes(suffix, up, facing))
     try:
         scene = trimesh.load_scene(path, process=False)
     except (MemoryError, KeyboardInterrupt):
@@ -61,6 +61,22 @@ def load_scene(path: str | Path, up: str | None = None, facing: str | None = Non
     return to_world(scene, rotation, where=str(path))
 
 
+def file_axes(suffix: str, up: str | None, facing: str | None) -> tuple[str, str]:
+    """Axes of a file that point up and forwards: those given, the rest as its format has them.
+
+    Args:
+        suffix: One of SUFFIXES.
+        up: "y", "z" or None.
+        facing: Signed axis or None; one along the format's own up axis makes the other axis up.
+    """
+    own_up, own_facing = _DEFAULT_AXES[suffix]
+    if up is None:
+        up = own_up if facing is None or facing[-1:] != own_up else {"y": "z", "z": "y"}[own_up]
+    if facing is None:
+        facing = own_facing if up == own_up else _FACINGS.get(up, ("",))[0]
+    return up, facing
+
+
 def axes_rotation(up: str, facing: str) -> np.ndarray:
     """Rotation (3, 3) from a file's axes to the world's.
 
@@ -69,10 +85,10 @@ def axes_rotation(up: str, facing: str) -> np.ndarray:
         facing: Signed axis across it.
 
     Raises:
-        DataError: If the two are no such axes.
+        ConfigError: If the two are no such axes.
     """
     if up not in _FACINGS or facing not in _FACINGS[up]:
-        raise DataError(
+        raise ConfigError(
             f"up = {up!r}, facing = {facing!r}: expected up y with facing one of {', '.join(_FACINGS['y'])}, "
             f"or up z with facing one of {', '.join(_FACINGS['z'])}."
         )
@@ -108,17 +124,6 @@ def to_world(scene: trimesh.Scene, rotation: np.ndarray, *, where: str) -> trime
     transform[:3, 3] = -scale * np.array(((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]))
     scene.apply_transform(transform)
     return scene
-
-
-def _axes(path: Path, up: str | None, facing: str | None) -> tuple[str, str]:
-    own_up, own_facing = _DEFAULT_AXES[path.suffix.lower()]
-    if up is None and facing is not None:
-        up = own_up if facing[-1:] != own_up else None
-        up = up or ("z" if own_up == "y" else "y")
-    up = up or own_up
-    if facing is None:
-        facing = own_facing if up == own_up else _FACINGS[up][0]
-    return up, facing
 
 
 def _axis(name: str) -> np.ndarray:

@@ -211,7 +211,7 @@ def _read_image(path: Path, size: tuple[int, int], modes: Sequence[str], convert
                 return np.array(image.convert(convert) if convert else image)
     except FileNotFoundError as err:
         raise DataError(f"{path}: no such file; restore it or capture the character again.") from err
-    except (OSError, SyntaxError, ValueError) as err:
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as err:
         raise DataError(
             f"{path}: can not be read as a picture ({err}); restore it or capture it again."
         ) from err

@@ -207,7 +207,8 @@ def add_to_split(
     Args:
         root: Folder of the data set; made if missing.
         split: Split to add to.
-        names: Characters, in order; none may be in the data set's lists yet.
+        names: Characters; none may be in the data set's lists yet. A split is kept sorted, so that it does
+            not depend on which of several processes ended first.
         made_by: Facts about how they were made, merged into what is there.
 
     Returns:
@@ -226,7 +227,7 @@ def add_to_split(
         again = [name for name in names if name in listed]
         if again:
             raise DataError(f"{path}: already lists {', '.join(again)}; names must differ.")
-        splits = {**info.splits, split: (*info.splits.get(split, ()), *names)}
+        splits = {**info.splits, split: tuple(sorted((*info.splits.get(split, ()), *names)))}
         info = DatasetInfo(root=root, splits=splits, made_by={**info.made_by, **(made_by or {})})
         write_dataset(info)
     return info
