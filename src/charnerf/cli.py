@@ -266,7 +266,7 @@ def reconstruct(
     ] = 128,
     faces: Annotated[int, typer.Option(min=4, help="Faces of the mesh after decimation.")] = 8000,
     frames: Annotated[int, typer.Option(min=1, help="Frames of the turntable.")] = 36,
-    size: Size = 256,
+    size: Size = 192,
     cameras: Annotated[
         int, typer.Option(min=1, help="Cameras whose directions the density is averaged over.")
     ] = 8,
@@ -278,23 +278,21 @@ def reconstruct(
     The images have alpha or a plain background, any sizes and crops: figures are cut out and brought to one
     height and floor line. What was assumed is printed, and drawn in the report.
     """
-    from charnerf.commands import load_model, say
-    from charnerf.reconstruction import reconstruct as run_reconstruction
+    from charnerf import commands
 
-    done = run_reconstruction(
-        load_model(weights, device=device, trust=trust or []),
-        front=front,
-        side=side,
-        back=back,
-        output=output,
+    commands.reconstruct(
+        (front, side, back),
+        output,
+        weights=weights,
         side_is=side_shows,
         resolution=resolution,
         faces=faces,
         frames=frames,
         size=size,
-        num_cameras=cameras,
+        cameras=cameras,
+        device=device,
+        trust=trust or [],
     )
-    say(f"{done.mesh}, {done.turntable}, {done.report}")
 
 
 @app.command(epilog=DEBUG_NOTE)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 import torch
 from omegaconf import OmegaConf
@@ -23,6 +24,7 @@ from charnerf.evaluation.report import write_run_report
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.model_api import Model
+from charnerf.reconstruction.folder import reconstruct as write_reconstruction
 
 LIGHTS = {"unlit": Unlit, "headlight": Headlight}
 RENDERERS = {
@@ -172,6 +174,38 @@ def mesh(
     output.mkdir(parents=True, exist_ok=True)
     path = save_mesh(built.mesh, output / f"{character}.{suffix}")
     say(f"{path}: {len(built.mesh.faces)} faces, level {built.level:.1f} 1/m, {built.seconds:.1f} s.")
+
+
+def reconstruct(
+    drawings: tuple[Path, Path, Path],
+    output: Path,
+    *,
+    weights: Path | None,
+    side_is: Literal["left", "right"],
+    resolution: int,
+    faces: int,
+    frames: int,
+    size: int,
+    cameras: int,
+    device: str,
+    trust: Sequence[str],
+) -> None:
+    """Reconstruct a character from front, side and back, and tell what was assumed about the drawings."""
+    front, side, back = drawings
+    done = write_reconstruction(
+        load_model(weights, device=device, trust=trust),
+        front=front,
+        side=side,
+        back=back,
+        output=output,
+        side_is=side_is,
+        resolution=resolution,
+        faces=faces,
+        frames=frames,
+        size=size,
+        num_cameras=cameras,
+    )
+    say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")
 
 
 def report(folder: Path) -> None:

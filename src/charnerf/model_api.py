@@ -91,8 +91,9 @@ class Model:
             raise ShapeError(
                 f"views: found {views.images.shape[0]} characters, expected 1; encode them one by one."
             )
+        views = views.to(self.device)
         with torch.no_grad():
-            scene = self.network.scene(self.network.encode(views.to(self.device)), 0)
+            scene = self.network.scene(self.network.encode(views), 0)
         return Hero(scene=scene, views=views, renderer=self.renderer)
 
 
@@ -164,7 +165,7 @@ class Hero:
         with torch.no_grad():
             return build_mesh(
                 self.scene,
-                self.views.to(self.scene.box_min.device),
+                self.views,
                 resolution=resolution,
                 num_cameras=num_cameras,
                 faces=faces,

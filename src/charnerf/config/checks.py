@@ -142,7 +142,7 @@ def check_arguments(
             continue
         full = join(key, name)
         if name in given and name in named:
-            problems.add(full, f"{title} gets '{name}' from the model, not from this section; remove it.")
+            problems.add(full, f"charnerf sets '{name}' of {title} itself; remove it.")
         elif name not in named and not is_open:
             problems.add(full, f"{title} takes no argument '{name}'; {nearest(str(name), settable)}")
         else:

@@ -74,6 +74,19 @@ class ModelSettings:
     activation: _part("charnerf.models.activations")  # type: ignore[valid-type]
 
 
+TRAINER_GIVEN = (
+    "callbacks",
+    "logger",
+    "max_epochs",
+    "num_sanity_val_steps",
+    "enable_progress_bar",
+    "enable_model_summary",
+    "use_distributed_sampler",
+    "gradient_clip_val",
+    "log_every_n_steps",
+)
+
+
 @dataclass(frozen=True)
 class RunConfig:
     """The sections of a run, as `conf/train.yaml` composes them."""
@@ -99,7 +112,7 @@ class RunConfig:
     schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
     data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
     optimizer: _part("torch.optim", given=["params"])  # type: ignore[valid-type]
-    trainer: _part("lightning")  # type: ignore[valid-type]
+    trainer: _part("lightning", given=TRAINER_GIVEN)  # type: ignore[valid-type]
 
 
 MODEL_SECTIONS = (
