@@ -3,35 +3,95 @@
 import numpy as np
 import trimesh
 
-from charnerf.capture.procedural import body
+from charnerf.capture.procedural import body, clothing, props
 from charnerf.capture.procedural.figure import Figure, make_figure
-from charnerf.capture.procedural.head import make_ears, make_head, make_head_form
+from charnerf.capture.procedural.hair import make_beard, make_hair
+from charnerf.capture.procedural.hats import make_hat
+from charnerf.capture.procedural.head import Head, make_ears, make_head, make_head_form, make_horns
+from charnerf.capture.procedural.outfit import Outfit, make_outfit
 from charnerf.capture.procedural.parts import Part, assemble, to_world
-from charnerf.capture.procedural.textures import add_emblem, add_pattern
 
 
-def _dressed(figure: Figure) -> list[Part]:
-    palette = figure.palette
-    trunk = body.trunk_canvas(figure, palette.main)
-    if figure.chance(0.5):
-        add_pattern(trunk, figure.rng, palette.second)
-    trunk.band(0.0, 0.2, palette.trousers)
-    trunk.band(0.17, 0.22, palette.leather)
-    add_emblem(trunk, 0.5, 0.65, 0.08, int(figure.rng.integers(12)), palette.accent)
-    arm = body.limb_canvas(figure, palette.skin, leg=False)
-    arm.band(0.0, figure.between(0.2, 1.0), palette.main)
-    leg = body.limb_canvas(figure, palette.trousers, leg=True)
+def _head(figure: Figure) -> list[Part]:
+    """Head, hair, ears, hat and horns."""
     head = make_head_form(figure)
-    return [
-        Part("trunk", body.trunk_shape(figure), trunk.image()),
-        *body.make_arms(figure, (arm, arm)),
-        *body.make_hands(figure, palette.skin),
-        *body.make_legs(figure, (leg, leg), 0.0),
-        *body.make_feet(figure, palette.boots, bare=False),
-        *body.make_neck(figure, palette.skin),
-        *make_head(figure, head, palette.hair, 0.75),
-        *make_ears(figure, head),
+    hat, covering = make_hat(figure, head) if figure.chance(0.36) else ([], False)
+    hair = make_hair(figure, head)
+    parts = make_head(
+        figure, head, None if hair.hairline is None else figure.palette.hair, hair.hairline or 0.0
+    )
+    parts += hat
+    if not covering or figure.chance(0.35):
+        parts += hair.parts
+    if figure.surface in ("human", "creature", "fur") and figure.chance(0.8 if not covering else 0.4):
+        parts += make_ears(figure, head)
+    if not hat and figure.chance({"creature": 0.5, "robot": 0.4, "skeleton": 0.15}.get(figure.surface, 0.03)):
+        parts += make_horns(figure, head)
+    if not figure.build.feminine and figure.surface in ("human", "creature") and figure.chance(0.14):
+        parts += make_beard(figure, head)
+    return parts
+
+
+def _worn(figure: Figure, outfit: Outfit, head: Head | None = None) -> list[Part]:
+    """Modelled clothes, armour and carried things."""
+    fighter = figure.chance(0.35)
+    plain = figure.build.name == "realistic" and not fighter
+    calm = 0.35 if plain else 1.0
+    parts: list[Part] = []
+    if figure.chance(0.35 if not plain else 0.15):
+        parts += clothing.make_belt(figure)
+    if figure.chance((0.4 if figure.build.feminine else 0.16) * (0.6 if plain else 1.0)):
+        parts += clothing.make_skirt(figure, outfit)
+    elif figure.chance(0.16 * calm):
+        parts += clothing.make_tabard(figure)
+    if figure.chance(0.14 * calm + 0.12 * fighter):
+        parts += clothing.make_cape(figure)
+    elif figure.chance(0.16 * calm):
+        parts += props.make_backpack(figure)
+    if figure.chance(0.14 * calm):
+        parts += clothing.make_scarf(figure)
+    if figure.chance(0.35 * calm) and not outfit.barefoot:
+        parts += clothing.make_boots(figure)
+    if figure.chance(0.2 * calm + 0.25 * fighter):
+        parts += clothing.make_bracers(figure)
+    if figure.chance(0.06 * calm + 0.4 * fighter):
+        parts += clothing.make_pauldrons(figure)
+    if figure.chance(0.05 * calm + 0.4 * fighter):
+        parts += clothing.make_breastplate(figure)
+    if figure.chance(0.08 * calm + 0.35 * fighter):
+        parts += props.make_held(figure)
+    if figure.chance({"fur": 0.7, "creature": 0.35}.get(figure.surface, 0.02)):
+        parts += props.make_tail(figure)
+    if figure.chance({"creature": 0.15, "robot": 0.06}.get(figure.surface, 0.03)):
+        parts += props.make_wings(figure)
+    if figure.chance(0.015 * calm):
+        parts += props.make_flag(figure)
+    return parts
+
+
+def _humanoid(figure: Figure) -> list[Part]:
+    outfit = make_outfit(figure)
+    ribs = figure.surface == "skeleton" and outfit.bare_trunk
+    trunk = (
+        clothing.make_ribs(figure)
+        if ribs
+        else [Part("trunk", body.trunk_shape(figure), outfit.trunk.image())]
+    )
+    loose = figure.between(0.0, 0.7) if figure.chance(0.3) else 0.0
+    feet = figure.palette.skin if outfit.barefoot else figure.palette.boots
+    parts = [
+        *trunk,
+        *body.make_arms(figure, outfit.arms),
+        *body.make_hands(figure, outfit.hand),
+        *body.make_legs(figure, outfit.legs, loose),
+        *body.make_feet(figure, feet, bare=outfit.barefoot),
+        *body.make_neck(figure, figure.palette.skin),
+        *_head(figure),
+        *_worn(figure, outfit),
     ]
+    if figure.surface == "robot" and figure.chance(0.7):
+        parts += clothing.make_robot_joints(figure)
+    return parts
 
 
 def make_parts(seed: int) -> list[Part]:
@@ -43,7 +103,7 @@ def make_parts(seed: int) -> list[Part]:
     Returns:
         Parts, 2 m tall together, feet on z = 0, facing -Y.
     """
-    return to_world(_dressed(make_figure(np.random.default_rng(seed))))
+    return to_world(_humanoid(make_figure(np.random.default_rng(seed))))
 
 
 def make_character(seed: int) -> trimesh.Scene:

@@ -88,5 +88,5 @@ def make_figure(rng: np.random.Generator) -> Figure:
         surface=surface,
         shade=float(rng.uniform(0.72, 0.95)) if rng.uniform() < 0.45 else 1.0,
         crisp=build.power > 2.9 or build.sides <= 6,
-        grain=float(rng.uniform(0.03, 0.12)) if rng.uniform() < 0.3 else 0.0,
+        grain=float(rng.uniform(0.02, 0.07)) if rng.uniform() < 0.3 else 0.0,
     )

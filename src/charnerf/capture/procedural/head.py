@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from charnerf.capture.procedural.figure import Figure
 from charnerf.capture.procedural.palette import BLACK, WHITE
@@ -18,7 +19,7 @@ WIDTHS: dict[str, tuple[float, ...]] = {
     "cheeks": (0.50, 0.82, 0.98, 1.0, 0.97, 0.92, 0.80, 0.56, 0.26),
     "block": (0.92, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.92),
     "bucket": (0.84, 0.90, 0.94, 0.97, 1.0, 1.0, 0.98, 0.90, 0.62),
-    "skull": (0.38, 0.52, 0.60, 0.74, 0.96, 1.0, 0.94, 0.70, 0.32),
+    "skull": (0.56, 0.66, 0.68, 0.80, 0.98, 1.0, 0.94, 0.70, 0.32),
 }
 
 
@@ -43,14 +44,31 @@ class Head:
         depth = build.head_depth * (0.35 + 0.65 * width)
         return centre - np.array((0.0, jut, 0.0)), np.array((build.head_width * width, depth))
 
-    def shell(self, figure: Figure, levels: Array, margins: Array, fronts: Array, backs: Array) -> Shape:
-        """A shape around the head: at each level, how far it reaches in head sizes sideways, forwards and backwards."""
+    def shell(
+        self,
+        figure: Figure,
+        levels: ArrayLike,
+        sideways: ArrayLike,
+        fronts: ArrayLike,
+        backs: ArrayLike,
+        *,
+        floor: float = 0.3,
+    ) -> Shape:
+        """A closed shape around the head: how far it reaches at each level, in half sizes of the head there.
+
+        Levels outside [floor, 0.92] take the head's size at that limit.
+        """
         centres, sizes = [], []
-        for level, margin, ahead, behind in zip(levels, margins, fronts, backs, strict=True):
-            centre, half = self.ring(figure, min(max(level, 0.0), 0.92))
-            centre = centre + (level - min(max(level, 0.0), 0.92)) * figure.build.head * UP
+        rows = np.stack(
+            np.broadcast_arrays(*(np.asarray(row, float) for row in (levels, sideways, fronts, backs))),
+            axis=-1,
+        )
+        for level, side, ahead, behind in rows:
+            inside = min(max(level, floor), 0.92)
+            centre, half = self.ring(figure, inside)
+            centre = centre + (level - inside) * figure.build.head * UP
             centres.append(centre + np.array((0.0, 0.5 * (behind - ahead) * half[1], 0.0)))
-            sizes.append((margin * half[0], max(0.5 * (behind + ahead) * half[1], 0.01)))
+            sizes.append((side * half[0], max(0.5 * (behind + ahead) * half[1], 0.01)))
         top = 0.02 * figure.build.head
         return loft(centres, sizes, axis=UP, sides=self.sides, power=self.power, bulge=(0.0, top))
 

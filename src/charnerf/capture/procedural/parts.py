@@ -12,7 +12,7 @@ from charnerf.capture.procedural.textures import Colour
 
 Texels = NDArray[np.uint8]
 BORDER = 2  # texels repeated around every texture, so that neighbours never bleed into each other
-SWATCH = 4  # side of a flat colour's patch, texels
+SWATCH = 4  # side of a flat colour's patch, texels; every texture begins at a multiple of it
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,9 @@ def flat(name: str, shape: Shape, colour: Colour) -> Part:
 def _padded(texels: Texels) -> Texels:
     if texels.shape[:2] == (1, 1):
         return np.repeat(np.repeat(texels, SWATCH, axis=0), SWATCH, axis=1)
-    return np.pad(texels, ((BORDER, BORDER), (BORDER, BORDER), (0, 0)), mode="edge")
+    rows, columns = texels.shape[:2]
+    more = (-(rows + 2 * BORDER) % SWATCH, -(columns + 2 * BORDER) % SWATCH)  # whole blocks of coarser levels
+    return np.pad(texels, ((BORDER, BORDER + more[0]), (BORDER, BORDER + more[1]), (0, 0)), mode="edge")
 
 
 def _pack(images: list[Texels]) -> tuple[Texels, list[tuple[int, int]]]:
@@ -70,8 +72,8 @@ def _atlas_uv(part: Part, corner: tuple[int, int], atlas_shape: tuple[int, ...])
 def _split_seams(shape: Shape, uv: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
     """One vertex for each distinct (vertex, texture coordinate): vertices, faces, uv per vertex."""
     steps = np.round(uv.reshape(-1, 2) * 2.0**20).astype(np.int64)
-    key = np.column_stack((shape.faces.reshape(-1), steps))
-    _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    key = (shape.faces.reshape(-1) << 42) + (steps[:, 0] << 21) + steps[:, 1]
+    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     vertices = shape.vertices[shape.faces.reshape(-1)[first]]
     return vertices, inverse.reshape(-1, 3), uv.reshape(-1, 2)[first]
 
