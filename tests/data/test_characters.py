@@ -83,7 +83,7 @@ def test_poses_stand_in_text_files_too(character_folder):
 
 
 def test_transforms_mean_what_nerfstudio_and_instant_ngp_read(character_folder):
-    """Their rays: ((i + 0.5 - cx) / fl, -(j + 0.5 - cy) / fl, -1) turned by the OpenGL pose, from its last column."""
+    """Their rays: ((x - cx) / fl, -(y - cy) / fl, -1) turned by the OpenGL pose, from its last column."""
     content = json.loads((character_folder / "transforms.json").read_text())
     keys = {"w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "camera_angle_x", "aabb_scale"}
     assert keys <= set(content)
@@ -236,7 +236,8 @@ def test_a_killed_writer_leaves_no_character(tmp_path):
         sys.path.insert(0, sys.argv[2])
         from test_characters import make_pictures
         from charnerf.data.characters import write_character
-        write_character(sys.argv[1], "hero", make_pictures(), write_mesh=lambda file: os.kill(os.getpid(), signal.SIGKILL))
+        die = lambda file: os.kill(os.getpid(), signal.SIGKILL)
+        write_character(sys.argv[1], "hero", make_pictures(), write_mesh=die)
     """
     here = os.path.dirname(__file__)
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(code), str(tmp_path), here], check=False)

@@ -14,7 +14,7 @@ import trimesh
 from PIL import Image
 
 from charnerf.data.color import linear_from_srgb, srgb_from_linear
-from charnerf.data.scene_mesh import COLORS_KEY, surface_of_scene
+from charnerf.data.scene_mesh import COLORS_KEY, placed_meshes, surface_of_scene
 from charnerf.data.surface_mesh import CUTOFF, SurfaceMaterial, SurfaceMesh, Texture, make_texture
 from charnerf.errors import DataError
 
@@ -192,4 +192,6 @@ def _read_foreign(mesh_file: Path) -> SurfaceMesh:
     scene = trimesh.load_scene(mesh_file, process=False)
     for mesh in scene.geometry.values():
         mesh.metadata[COLORS_KEY] = "srgb"
+    if not placed_meshes(scene):
+        raise DataError(f"{mesh_file}: found no faces, expected triangles; capture the character again.")
     return surface_of_scene(scene)

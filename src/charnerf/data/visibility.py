@@ -13,7 +13,8 @@ from charnerf.data.transforms import read_transforms
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles, fibonacci_hemisphere
 from charnerf.types import Cameras
 
-_TOLERANCE = 3e-4  # m in front of a point that is still the point: float32 along rays of some metres
+_TOLERANCE = 2e-5  # m in front of a point that is still the point: float32 along rays of some metres
+_MIN_COSINE = 0.01  # flatter than this, a ray that leaves a body beside an edge passes for one that enters
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,10 @@ def see_points(mesh: SurfaceMesh, points: np.ndarray, triangles: np.ndarray, cam
             break
         origins, directions, distances = _rays_to(cameras[index], points[hidden])
         hits = caster.first_hits(origins, directions)
+        cosines = (normals[hidden] * directions).sum(axis=-1)
         seen = (hits.triangles == triangles[hidden]) | (hits.distances > distances - _TOLERANCE)
-        away = (normals[hidden] * directions).sum(axis=-1) > 0.0
-        normals[hidden[seen & away]] *= -1.0
+        seen &= np.abs(cosines) > _MIN_COSINE
+        normals[hidden[seen & (cosines > 0.0)]] *= -1.0
         visible[hidden[seen]] = True
         hidden = hidden[~seen]
     return Seen(visible=visible, normals=normals)
