@@ -1,0 +1,111 @@
+"""Which room may import which, checked on the source text; the tables are the rule."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "src" / "charnerf"
+FILES = sorted(PACKAGE.rglob("*.py"))
+MAX_LINES = 400
+
+LAYERS = (
+    ("errors", "checks", "types", "schedule", "config"),
+    ("geometry",),
+    ("models", "volume", "data", "losses"),
+    ("capture", "drawings", "evaluation", "meshing", "model_api", "reconstruction", "runs", "stability", "training"),
+    ("cli", "commands", "__main__", "__init__"),
+)
+LAYER_OF = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
+WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may import one another
+    ("evaluation", "meshing"),
+    ("model_api", "drawings"),
+    ("model_api", "meshing"),
+    ("reconstruction", "drawings"),
+    ("reconstruction", "meshing"),
+    ("reconstruction", "model_api"),
+    ("runs", "model_api"),
+    ("training", "evaluation"),
+    ("training", "meshing"),
+    ("training", "runs"),
+}
+ONLY_IN = {  # foreign package: where it may be imported
+    "hydra": ("config", "runs"),
+    "omegaconf": ("config", "runs", "commands", "training/run", "training/finish"),
+    "lightning": ("training", "data/datamodule"),
+    "typer": ("cli",),
+}
+
+
+def imports_of(file: Path) -> Iterator[tuple[int, str]]:
+    """Line and full name of everything that a file imports, in functions too; type checking aside."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    skipped = {
+        inner
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+        for statement in node.body
+        for inner in ast.walk(statement)
+    }
+    for node in ast.walk(tree):
+        if node in skipped:
+            continue
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}:{node.lineno}: relative import, expected a full name"
+            if node.module == "charnerf":
+                yield from ((node.lineno, f"charnerf.{alias.name}") for alias in node.names)
+            elif node.module is not None:
+                yield node.lineno, node.module
+
+
+def room_of(file: Path) -> str:
+    """First folder below the package, or the module."""
+    return file.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_rooms_import_downward_only(file: Path) -> None:
+    room = room_of(file)
+    assert room in LAYER_OF, f"{file}: room '{room}' is in no layer; put it into the table"
+    for line, name in imports_of(file):
+        if not name.startswith("charnerf."):
+            continue
+        other = name.split(".")[1]
+        if other == room or other not in LAYER_OF:
+            continue
+        here, there = LAYER_OF[room], LAYER_OF[other]
+        is_end = here in (0, len(LAYERS) - 1)
+        allowed = there < here or (there == here and (is_end or (room, other) in WITHIN_A_LAYER))
+        assert allowed, f"{file}:{line}: {room} imports {other}, which is not below it"
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_frameworks_stay_in_their_rooms(file: Path) -> None:
+    module = file.relative_to(PACKAGE).with_suffix("").as_posix()
+    for line, name in imports_of(file):
+        places = ONLY_IN.get(name.split(".")[0])
+        if places is not None:
+            fine = any(module == place or module.startswith(f"{place}/") for place in places)
+            assert fine, f"{file}:{line}: imports {name}, which belongs to {', '.join(places)}"
+
+
+def test_no_drawer_for_leftovers() -> None:
+    names = {part for file in FILES for part in file.relative_to(PACKAGE).with_suffix("").parts}
+    assert not names & {"utils", "util", "helpers", "misc", "common"}
+
+
+@pytest.mark.parametrize("file", [*FILES, ROOT / "train.py"], ids=lambda file: file.name)
+def test_files_stay_short(file: Path) -> None:
+    count = len(file.read_text(encoding="utf-8").splitlines())
+    assert count <= MAX_LINES, f"{file}: {count} lines, expected at most {MAX_LINES}; split it by idea"
+
+
+def test_the_rules_bite(tmp_path: Path) -> None:
+    """An import inside a function, and one by `from charnerf import`, are both seen."""
+    file = tmp_path / "x.py"
+    file.write_text("def f():\n    from charnerf import cli\n    import lightning.pytorch\n")
+    assert list(imports_of(file)) == [(2, "charnerf.cli"), (3, "lightning.pytorch")]
