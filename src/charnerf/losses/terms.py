@@ -24,10 +24,16 @@ def squared_opacity_error(opacity: Tensor, target_alphas: Tensor) -> Tensor:
     return (opacity - target_alphas).square().mean()
 
 
-def absolute_depth_error(depth: Tensor, target_depth: Tensor) -> Tensor:
-    """Mean over rays that meet the surface (target above 0) of |depth - target|, m; 0 if none does."""
+def absolute_depth_error(depth: Tensor, target_depth: Tensor, opacity: Tensor) -> Tensor:
+    """Mean over rays that meet the surface (target above 0) of opacity * |depth - target|, m; 0 if none does.
+
+    The opacity weighs without a gradient of its own: the depth of the seen part moves by (t - depth) /
+    opacity with a weight, up to 1e7 m on a ray that sees nothing yet, and the product stays within the
+    length of the ray.
+    """
     known = (target_depth > 0).to(depth.dtype)
-    return ((depth - target_depth).abs() * known).sum() / known.sum().clamp_min(1.0)
+    error = opacity.detach() * (depth - target_depth).abs()
+    return (error * known).sum() / known.sum().clamp_min(1.0)
 
 
 def balanced_occupancy_error(alphas: Tensor, inside: Tensor) -> Tensor:

@@ -84,7 +84,7 @@ def _term(term: str, one: PassOutput, batch: TrainBatch) -> Tensor | None:
         case "opacity":
             return squared_opacity_error(one.rays.opacity, batch.alpha)
         case "depth" if batch.depth is not None:
-            return absolute_depth_error(one.rays.depth, batch.depth)
+            return absolute_depth_error(one.rays.depth, batch.depth, one.rays.opacity)
         case "surface_rgb" if one.surface_rgb is not None and batch.surface is not None:
             return squared_color_error(one.surface_rgb, batch.surface.rgb)
         case "surface_alpha" if one.surface_alpha is not None:
