@@ -127,7 +127,7 @@ def hidden_view_cases(target: Target) -> Iterator[CheckRow]:
 
 
 def activation_cases(target: Target) -> Iterator[CheckRow]:
-    """Densities of raw values from -1e4 to 1e4, relative, and gradients; the plain exponential beside them."""
+    """Densities of raw values from -1e4 to 1e4, relative, and gradients; the plain exponential beside."""
     half = torch.logspace(-6, 4, 41, dtype=torch.float64)
     raw = target.tensor(torch.cat((-half.flip(0), half)))
     exp = TruncatedExp(shift=-1.0, scale=20.0, limit=8.0)
@@ -181,8 +181,8 @@ def loss_cases(target: Target) -> Iterator[CheckRow]:
         "alpha, perfect": (absolute_alpha_error, one, one, 0.0),
         "alpha, all wrong": (absolute_alpha_error, zero, one, 1.0),
         "opacity, all wrong": (squared_opacity_error, one, zero, 1.0),
-        "depth, none known": (absolute_depth_error, one, zero, 0.0),
-        "depth, 1 m off": (absolute_depth_error, 3.0 * one, 2.0 * one, 1.0),
+        "depth, none known": (_opaque_depth_error, one, zero, 0.0),
+        "depth, 1 m off": (_opaque_depth_error, 3.0 * one, 2.0 * one, 1.0),
         "occupancy, all inside": (balanced_occupancy_error, one, one, 0.0),
         "occupancy, all outside, all wrong": (balanced_occupancy_error, one, zero, 0.5),
     }
@@ -192,11 +192,26 @@ def loss_cases(target: Target) -> Iterator[CheckRow]:
         (gradient,) = torch.autograd.grad(value, leaf)
         errors = Errors(largest(doubled(value) - exact), None, count_non_finite(value, gradient))
         yield target.row("loss", name, errors, Bounds(1e-6, 1e-15))
-    weights = target.tensor([[1e-12, 0.0]]).requires_grad_()
-    depth = expected_depth(weights, target.tensor([[2.0, 3.0]]), target.tensor([4.0]))
-    (gradient,) = torch.autograd.grad(absolute_depth_error(depth, target.tensor([2.0])), weights)
-    errors = Errors(largest(gradient), None, count_non_finite(depth, gradient))
-    yield target.row("loss", "depth of an empty ray: gradient", errors, Bounds(None, None))
 
 
-CASES = (combinator_cases, hidden_view_cases, activation_cases, surface_cases, loss_cases)
+def depth_loss_cases(target: Target) -> Iterator[CheckRow]:
+    """Steepest gradient of the depth term on a ray that sees next to nothing, over the length of the ray."""
+    if target.is_half:
+        return
+    for formula in ("ours", "naive"):
+        weights = target.tensor([[1e-12, 0.0], [1e-3, 0.0], [0.5, 0.5]]).requires_grad_()
+        depth = expected_depth(weights, target.tensor([[2.0, 3.0]]), target.tensor([4.0]))
+        opacity = weights.sum(-1) if formula == "ours" else torch.ones_like(depth)
+        term = absolute_depth_error(depth, target.tensor([2.0, 2.0, 2.0]), opacity)
+        (gradient,) = torch.autograd.grad(3.0 * term, weights)
+        errors = Errors(largest(gradient) / 2.0, None, count_non_finite(depth, gradient))
+        yield target.row(
+            "loss", "depth of an empty ray, gradient / m", errors, Bounds(1.0, 1.0), formula=formula
+        )
+
+
+def _opaque_depth_error(depth: Tensor, wanted: Tensor) -> Tensor:
+    return absolute_depth_error(depth, wanted, torch.ones_like(depth))
+
+
+CASES = (combinator_cases, hidden_view_cases, activation_cases, surface_cases, loss_cases, depth_loss_cases)

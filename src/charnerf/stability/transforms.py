@@ -1,5 +1,6 @@
-"""Cases of rotation, scaling and translation of the world: rays, cameras, hull, compositing must not notice."""
+"""Cases of rotation, scaling and translation: rays, cameras, hull and compositing must not notice."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -17,23 +18,27 @@ from charnerf.volume.compositing import weights_from_densities
 
 @dataclass(frozen=True)
 class Motion:
-    """x -> scale * rotation @ x + offset; a quarter turn keeps boxes axis-aligned.
+    """x -> scale * rotation @ x + offset.
 
     Attributes:
-        quarter_turns: About z.
+        quarter_turns: About z: boxes stay axis-aligned.
+        tilt_deg: Then about x: boxes do not.
         scale: Of all lengths.
         offset: Metres along x; y and z get halves and quarters of it.
     """
 
     name: str
     quarter_turns: int = 0
+    tilt_deg: float = 0.0
     scale: float = 1.0
     offset: float = 0.0
 
     def matrix(self, like: Tensor) -> Tensor:
-        """The rotation, (3, 3), exact."""
+        """The rotation, (3, 3)."""
         turn = like.new_tensor([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        return torch.linalg.matrix_power(turn, self.quarter_turns)
+        cosine, sine = math.cos(math.radians(self.tilt_deg)), math.sin(math.radians(self.tilt_deg))
+        tilt = like.new_tensor([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+        return tilt @ torch.linalg.matrix_power(turn, self.quarter_turns)
 
     def points(self, points: Tensor) -> Tensor:
         """Move points (..., 3)."""
@@ -57,6 +62,7 @@ class Motion:
 MOTIONS = (
     Motion("quarter turn", quarter_turns=1),
     Motion("half turn", quarter_turns=2),
+    Motion("quarter turn, tilted by 37 degrees", quarter_turns=1, tilt_deg=37.0),
     Motion("scaled by 1e-3", scale=1e-3),
     Motion("scaled by 1e3", scale=1e3),
     Motion("moved by 100 m", offset=100.0),
@@ -94,12 +100,11 @@ def camera_cases(target: Target) -> Iterator[CheckRow]:
             kind = f"{'orthographic' if orthographic else 'pinhole'}, {motion.name}"
             rest, depth, _ = project(cameras, points)
             moved, moved_depth, in_front = project(motion.cameras(cameras), motion.points(points))
-            errors = torch.maximum(
-                (moved - rest).abs().amax(-1) / 64, (moved_depth / motion.scale - depth).abs() / 4
-            )
+            aside = (moved - rest).abs().amax(-1) / 64
+            off = torch.maximum(aside, (moved_depth / motion.scale - depth).abs() / 4)
             bad = count_non_finite(moved, moved_depth) + int((~in_front).sum())
             bounds = Bounds(1e-6 * far, 2e-15 * far)
-            yield target.row("moved projection", kind, Errors(largest(errors), None, bad), bounds)
+            yield target.row("moved projection", kind, Errors(largest(off), None, bad), bounds)
             rays, turned = pixel_rays(cameras, pixels), pixel_rays(motion.cameras(cameras), pixels)
             aim = turned.directions - rays.directions @ motion.matrix(rays.directions).T
             start = (turned.origins - motion.points(rays.origins)) / motion.scale
@@ -128,6 +133,8 @@ def hull_cases(target: Target) -> Iterator[CheckRow]:
     length = _occupied_length(hull, rays)
     near, far = box_interval(rays, low, high)
     for motion in MOTIONS:
+        if motion.tilt_deg:
+            continue
         wide = 100.0 if motion.offset else 1.0
         box_min, box_max = motion.box(low, high)
         turned = RayBundle(motion.points(rays.origins), rays.directions @ motion.matrix(rays.directions).T)
