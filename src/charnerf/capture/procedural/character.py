@@ -9,7 +9,10 @@ from charnerf.capture.procedural.hair import make_beard, make_hair
 from charnerf.capture.procedural.hats import make_hat
 from charnerf.capture.procedural.head import Head, make_ears, make_head, make_head_form, make_horns
 from charnerf.capture.procedural.outfit import Outfit, make_outfit
-from charnerf.capture.procedural.parts import Part, assemble, to_world
+from charnerf.capture.procedural.parts import Part, assemble, pixelated, to_world
+from charnerf.capture.procedural.voxels import make_voxel_parts
+
+VOXEL_SHARE = 0.09
 
 
 def _head(figure: Figure) -> list[Part]:
@@ -103,7 +106,15 @@ def make_parts(seed: int) -> list[Part]:
     Returns:
         Parts, 2 m tall together, feet on z = 0, facing -Y.
     """
-    return to_world(_humanoid(make_figure(np.random.default_rng(seed))))
+    rng = np.random.default_rng(seed)
+    if rng.uniform() < VOXEL_SHARE:
+        return to_world(make_voxel_parts(rng))
+    figure = make_figure(rng)
+    parts = _humanoid(figure)
+    if figure.build.name == "blocky" and figure.chance(0.5):
+        cell = int(rng.integers(4, 9))
+        parts = [pixelated(part, cell) for part in parts]
+    return to_world(parts)
 
 
 def make_character(seed: int) -> trimesh.Scene:

@@ -90,12 +90,17 @@ def make_palette(rng: np.random.Generator, surface: str) -> Palette:
     step = rng.choice((0.08, 0.33, 0.5, 0.58))
     trousers = pick(rng, NEUTRALS) if rng.uniform() < 0.6 else _cloth(rng, hue + rng.uniform(-0.1, 0.1))
     leather = pick(rng, LEATHERS)
+    main, second = _cloth(rng, hue), _cloth(rng, hue + step)
+    if rng.uniform() < 0.2:
+        trousers = np.clip(main * rng.uniform(0.6, 1.15), 0.0, 1.0)  # suits, uniforms, overalls
+    if rng.uniform() < 0.12:
+        second = np.clip(main * rng.uniform(0.6, 1.3), 0.0, 1.0)
     return Palette(
         skin=skin,
         hair=hair,
         eyes=vivid(rng, rng.uniform(), (0.3, 0.8)) if rng.uniform() < 0.5 else np.array((0.12, 0.10, 0.10)),
-        main=_cloth(rng, hue),
-        second=_cloth(rng, hue + step),
+        main=main,
+        second=second,
         accent=vivid(rng, hue + rng.choice((0.15, 0.5, 0.6)))
         if rng.uniform() < 0.7
         else np.array((0.85, 0.68, 0.26)),

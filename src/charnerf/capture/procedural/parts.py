@@ -30,6 +30,17 @@ def flat(name: str, shape: Shape, colour: Colour) -> Part:
     return Part(name, shape, texel.reshape(1, 1, 3))
 
 
+def pixelated(part: Part, cell: int) -> Part:
+    """The part with its texture in coarse squares of cell texels."""
+    rows, columns = part.texels.shape[:2]
+    if min(rows, columns) < 2 * cell:
+        return part
+    row, column = np.arange(rows) // cell * cell + cell // 2, np.arange(columns) // cell * cell + cell // 2
+    return Part(
+        part.name, part.shape, part.texels[np.minimum(row, rows - 1)][:, np.minimum(column, columns - 1)]
+    )
+
+
 def _padded(texels: Texels) -> Texels:
     if texels.shape[:2] == (1, 1):
         return np.repeat(np.repeat(texels, SWATCH, axis=0), SWATCH, axis=1)
