@@ -3,8 +3,11 @@
 import os
 from pathlib import Path
 
+import helpers
 import pytest
 import torch
+
+from charnerf.types import SourceViews
 
 ROOT = Path(__file__).resolve().parents[1]
 OPT_IN = {"gpu": "CHARNERF_TEST_GPU", "blender": "CHARNERF_TEST_BLENDER", "slow": "CHARNERF_TEST_SLOW"}
@@ -28,3 +31,20 @@ def _one_seed() -> None:
 def conf() -> Path:
     """Folder of the config files."""
     return ROOT / "conf"
+
+
+@pytest.fixture(scope="session")
+def person_views() -> SourceViews:
+    """Front, side and back drawing of a person with a raised left arm, 32 px, B = 1."""
+    return helpers.source_views(helpers.person(symmetric=False))
+
+
+@pytest.fixture(scope="session")
+def figure_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set of analytic figures, 32 px, 8 views each with depth and mesh; read only."""
+    root = tmp_path_factory.mktemp("figures") / "dataset"
+    helpers.write_figure(root, "lefty", "train", helpers.person(symmetric=False))
+    helpers.write_figure(root, "mirror", "train", helpers.person())
+    helpers.write_figure(root, "rods", "val", helpers.dumbbell(), views=3)
+    helpers.write_figure(root, "twin", "test", helpers.person(), views=3)
+    return root
