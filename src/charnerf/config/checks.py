@@ -89,10 +89,16 @@ def check_annotated(hint: Any, value: Any, key: str, problems: Problems) -> None
 def check_children(hint: Any, value: Any, key: str, problems: Problems) -> None:
     """Check the members of a list or mapping that fits its hint as a whole; nested parts everywhere."""
     chosen = next((one for one in alternatives(hint) if fits(one, value)), Any)
+    if get_origin(chosen) is Annotated:
+        check_annotated(chosen, value, key, problems)
+        return
     arguments = get_args(chosen)
     if isinstance(value, Mapping):
-        member = arguments[1] if len(arguments) == 2 else Any
+        names, member = arguments if len(arguments) == 2 else (Any, Any)
         for name, item in value.items():
+            if not fits(names, name):
+                problems.add(join(key, name), f"unknown key; {nearest(str(name), map(str, get_args(names)))}")
+                continue
             check_value(member, item, join(key, name), problems)
     elif isinstance(value, list):
         member = arguments[0] if arguments else Any

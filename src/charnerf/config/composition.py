@@ -132,12 +132,17 @@ def _hydra(conf: Path) -> Iterator[None]:
 
 
 def _parse(overrides: Sequence[str]) -> list[Override]:
+    """Read overrides; one that can not be read is named alone."""
     loader = GlobalHydra.instance().config_loader() if GlobalHydra.instance().is_initialized() else None
-    try:
-        return OverridesParser.create(config_loader=loader).parse_overrides(list(overrides))  # type: ignore[arg-type]
-    except HydraException as error:
-        first = str(error).splitlines()[0]
-        raise ConfigError(f"{' '.join(overrides)}: can not be read ({first}), expected key=value.") from error
+    parser = OverridesParser.create(config_loader=loader)  # type: ignore[arg-type]
+    parsed: list[Override] = []
+    for one in overrides:
+        try:
+            parsed += parser.parse_overrides([one])
+        except HydraException as error:
+            first = str(error).splitlines()[0]
+            raise ConfigError(f"{one}: can not be read ({first}), expected key=value.") from error
+    return parsed
 
 
 def _jobs(overrides: Sequence[str]) -> list[list[str]]:
@@ -150,7 +155,12 @@ def _jobs(overrides: Sequence[str]) -> list[list[str]]:
 
 def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
     """Compose; a key that Hydra does not know is let in: `validate` names it beside all other problems."""
-    accepted = [one.input_line or "" for one in _parse(overrides)]
+    accepted = []
+    for one in _parse(overrides):
+        options = GlobalHydra.instance().config_loader().get_group_options(one.key_or_group)
+        if options and not one.is_delete() and not isinstance(one.value(), str | list | None):
+            raise ConfigError(_no_option(one.key_or_group, str(one.value()), options))
+        accepted.append(one.input_line or "")
     for _ in range(len(accepted) + 1):
         try:
             return compose(name, overrides=accepted)
@@ -180,12 +190,13 @@ def _about_missing_option(error: MissingConfigException) -> str:
             " for `train`."
         )
     options = list(error.options or GlobalHydra.instance().config_loader().get_group_options(group))
-    listed = ", ".join(sorted(options))
+    return _no_option(group, option, options)
+
+
+def _no_option(group: str, option: str, options: Sequence[str]) -> str:
     close = nearest(option, options)
-    return (
-        f"{group}: found no option '{option}', expected one of:"
-        f" {listed}.{' D' + close[1:] if close.startswith('did') else ''}"
-    )
+    also = f" D{close[1:]}" if close.startswith("did") else ""
+    return f"{group}: found no option '{option}', expected one of: {', '.join(sorted(options))}.{also}"
 
 
 def _about_composition(error: BaseException) -> str:

@@ -1,0 +1,319 @@
+"""Every option composes, validates and builds; everything wrong is named in one message."""
+
+import inspect
+from pathlib import Path
+
+import pytest
+from hydra.utils import get_object
+from omegaconf import OmegaConf
+
+from charnerf import runs
+from charnerf.config import validate, validate_model
+from charnerf.config.composition import check_command_line, compose_config
+from charnerf.errors import ConfigError
+
+ROOT = Path(__file__).resolve().parents[1]
+OPTIONS = sorted(file.relative_to(ROOT / "conf") for file in (ROOT / "conf").glob("*/*.yaml"))
+MODEL_GROUPS = ("encoder", "combinator", "head", "density", "views", "features", "quadrature", "renderer")
+EXPERIMENT_ROWS = {"charnerf", "pixelnerf", "single_encoder", "no_mha", "no_mha_depth", "no_view"}
+
+
+def overrides_for(option: Path) -> list[str]:
+    overrides = [f"{option.parent}={option.stem}"]
+    return [*overrides, "data.root=/tmp"] if option.as_posix() == "data/folder.yaml" else overrides
+
+
+def problem(*overrides: str) -> str:
+    with pytest.raises(ConfigError) as caught:
+        compose_config(["scale=smoke", *overrides])
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("option", OPTIONS, ids=lambda option: option.with_suffix("").as_posix())
+def test_every_option_composes_and_validates(option: Path) -> None:
+    cfg = compose_config(overrides_for(option))
+    assert cfg.scale.image_size >= 8
+
+
+@pytest.mark.parametrize(
+    "option",
+    [one for one in OPTIONS if one.parent.name in MODEL_GROUPS],
+    ids=lambda one: one.with_suffix("").as_posix(),
+)
+def test_every_model_option_builds(option: Path) -> None:
+    cfg = compose_config(["scale=smoke", *overrides_for(option)])
+    model = runs.build_model(cfg)
+    assert sum(p.numel() for p in model.parameters()) > 0
+    assert type(runs.build_renderer(cfg)).__module__.startswith("charnerf.volume.renderers")
+
+
+@pytest.mark.parametrize("group", ["loss", "schedule", "data"])
+def test_other_options_build(group: str) -> None:
+    for option in OPTIONS:
+        if option.parent.name == group:
+            cfg = compose_config(overrides_for(option))
+            assert type(runs.build_part(cfg[group])).__module__.startswith("charnerf.")
+
+
+def test_experiments_are_rows_of_the_table() -> None:
+    there = {option.stem for option in OPTIONS if option.parent.name == "experiment"}
+    assert there <= EXPERIMENT_ROWS
+    assert {"charnerf", "single_encoder", "no_mha", "no_view"} <= there
+
+
+@pytest.mark.parametrize(
+    ("row", "changed"),
+    [("single_encoder", {"encoder"}), ("no_mha", {"combinator"}), ("no_view", {"combinator"})],
+)
+def test_experiments_differ_from_the_paper_only_in_their_name(row: str, changed: set[str]) -> None:
+    paper = OmegaConf.to_container(compose_config(["experiment=charnerf"]), resolve=True)
+    other = OmegaConf.to_container(compose_config([f"experiment={row}"]), resolve=True)
+    assert isinstance(paper, dict)
+    assert isinstance(other, dict)
+    assert {key for key in paper if paper[key] != other[key]} == {"name", *changed}
+    assert other["name"] == row
+
+
+def test_overrides_win_over_an_experiment() -> None:
+    cfg = compose_config(["experiment=no_mha", "combinator=sa", "scale=base", "seed=3"])
+    assert cfg.combinator._target_.endswith("SelfAttention")
+    assert (cfg.scale.width, cfg.seed) == (compose_config(["scale=base"]).scale.width, 3)
+
+
+def test_a_fine_field_is_its_own() -> None:
+    cfg = compose_config(["scale=smoke", "renderer.num_fine=4"])
+    model = runs.build_model(cfg)
+    assert model.fine is not None
+    coarse = {id(parameter) for parameter in model.coarse.parameters()}
+    assert coarse.isdisjoint(id(parameter) for parameter in model.fine.parameters())
+    assert runs.build_model(compose_config(["scale=smoke", "renderer.num_fine=0"])).fine is None
+
+
+# What is wrong, and the message.
+
+
+def test_typos_name_the_full_key_and_the_nearest_name() -> None:
+    assert (
+        problem("encoder=single", "+encoder.num_stack=2")
+        == "encoder.num_stack: charnerf.models.encoders.single.SingleHourglass takes no argument"
+        " 'num_stack'; "
+        "did you mean 'num_stacks'?"
+    )
+    assert problem("budget.step=3") == "budget.step: unknown key; did you mean 'steps'?"
+    assert (
+        problem("+optimizer.lrr=1.0")
+        == "optimizer.lrr: torch.optim.Adam takes no argument 'lrr'; did you mean 'lr'?"
+    )
+    assert (
+        problem("+trainer.limit_val_batch=1")
+        == "trainer.limit_val_batch: lightning.Trainer takes no argument 'limit_val_batch'; "
+        "did you mean 'limit_val_batches'?"
+    )
+
+
+@pytest.mark.parametrize("override", ["+typo=1", "typo=1", "++typo=1"])
+def test_an_unknown_key_is_refused_however_it_is_added(override: str) -> None:
+    message = problem(override)
+    assert message.startswith("typo: unknown key; expected one of: ")
+
+
+@pytest.mark.parametrize(
+    "section",
+    ["model", "scale", "budget", "sampling", "combinator", "loss", "schedule", "renderer", "data", "surface"],
+)
+def test_an_unknown_key_is_refused_in_every_section(section: str) -> None:
+    assert problem(f"+{section}.zzz=1").startswith(f"{section}.zzz: ")
+
+
+def test_wrong_types_are_named() -> None:
+    assert problem("seed=abc") == "seed: found 'abc' (str), expected int."
+    assert problem("scale.width=1.5") == "scale.width: found 1.5 (float), expected int."
+    assert problem("model.hull=3") == "model.hull: found 3 (int), expected bool."
+    assert problem("optimizer.lr=fast").startswith("optimizer.lr: found 'fast' (str), expected ")
+    assert problem("model.box_centre=[0,0,high]") == "model.box_centre.2: found 'high' (str), expected float."
+    assert (
+        problem("encoder=single", "encoder.num_stacks=[1]")
+        == "encoder.num_stacks: found [1] (list), expected int."
+    )
+    assert problem("encoder=3").startswith("encoder: found no option '3', expected one of: double, ")
+    assert problem("model=3").startswith("model: found 3 (int), expected a section with ")
+    assert problem("scale.width=true") == "scale.width: found True (bool), expected int."
+
+
+def test_numbers_out_of_range_are_named() -> None:
+    assert problem("scale.width=0", "combinator=mean") == "scale.width: found 0, expected at least 1."
+    assert problem("budget.seconds=0") == "budget.seconds: found 0, expected more than 0."
+    assert problem("data.views=0") == "data.views: found 0, expected at least 1."
+
+
+def test_what_is_missing_is_named() -> None:
+    assert problem("data=folder") == "data.root: not set, expected str; set data.root=... ."
+    assert problem("~combinator").startswith(
+        "combinator: not set, expected a section with _target_, a class of "
+    )
+    assert (
+        problem("~combinator.num_heads", "combinator=view_mha")
+        == "combinator.num_heads: not set, but charnerf.models.combinators.view_attention.ViewAttention needs"
+        " it: int."
+    )
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "os.system",
+        "builtins.eval",
+        "subprocess.Popen",
+        "charnerf.cli.sys.exit",
+        "charnerf.runs.os.system",
+        "charnerf.runs.load",
+        "torch.optim.Adam",
+        "torch.hub.load",
+        "lightning.Trainer",
+        "charnerf.models.encoders.single.torch.load",
+        "charnerf.models.encoders.__import__",
+    ],
+)
+def test_targets_outside_their_home_are_refused(target: str) -> None:
+    message = problem(f"encoder._target_={target}")
+    assert message.startswith("encoder._target_: ")
+    assert "charnerf.models.encoders" in message
+
+
+def test_foreign_targets_are_refused_wherever_they_hide() -> None:
+    message = problem("+trainer.profiler={_target_: os.system, command: x}")
+    assert message.startswith("trainer.profiler._target_: found 'os.system'")
+    message = problem("+trainer.plugins=[{_target_: os.system, command: x}]")
+    assert message.startswith(
+        "trainer.plugins.0._target_: found 'os.system', expected a class of charnerf or "
+    )
+    assert "trusted_targets=[os] on the command line" in message
+
+
+def test_a_class_that_does_not_exist_is_named() -> None:
+    message = problem("encoder=single", "encoder._target_=charnerf.models.encoders.single.SingleHourglas")
+    assert (
+        message == "encoder._target_: 'charnerf.models.encoders.single.SingleHourglas' does not exist: "
+        "charnerf.models.encoders.single has no 'SingleHourglas'; did you mean 'SingleHourglass'?"
+    )
+
+
+def test_own_classes_are_trusted_from_the_command_line_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mylab.py").write_text(
+        "class Mean:\n    def __init__(self, *, width: int) -> None:\n        pass\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    mine = ["scale=smoke", "combinator=mean", "combinator._target_=mylab.Mean"]
+    assert "trusted_targets=[mylab]" in problem(*mine[1:])
+    cfg = compose_config([*mine, "trusted_targets=[mylab]"])
+    assert cfg.combinator._target_ == "mylab.Mean"
+    with pytest.raises(ConfigError, match=r"mylab\.Mean"):
+        validate(cfg)  # its own trusted_targets do not count
+    with pytest.raises(ConfigError, match=r"mylab\.Mean"):
+        validate_model(cfg)
+    validate_model(cfg, trusted_targets=["mylab"])
+    (tmp_path / "mylab2.py").write_text("import os\nfrom os import system as Mean\n")
+    assert "which is posix.system" in problem(
+        "combinator=mean", "combinator._target_=mylab2.Mean", "trusted_targets=[mylab2]"
+    )
+
+
+def test_combinations_that_can_not_work_are_named() -> None:
+    assert (
+        problem("combinator=sa", "combinator.num_heads=3")
+        == "combinator.num_heads: found 3, expected a divisor of scale.width = 16."
+    )
+    assert problem("budget.steps=null", "budget.seconds=null").startswith(
+        "budget.steps: found null, and budget."
+    )
+    assert problem("schedule.phases=[]") == "schedule.phases: found none, expected at least one phase."
+    assert "expected at least one weight above 0." in problem(
+        "loss=rays_only", "loss.weights.reconstruction=0"
+    )
+    assert problem("++loss.weights.opacity=-1").startswith(
+        "loss.weights.opacity: found -1, expected 0 or more."
+    )
+
+
+def test_phases_that_do_not_ascend_are_named() -> None:
+    one = "{_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0, until: {steps: 5}}"
+    last = "{_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0}"
+    assert (
+        problem(f"schedule.phases=[{one},{one},{last}]")
+        == "schedule.phases: found ends [5, 5] in steps, expected them to ascend."
+    )
+    assert problem(f"schedule.phases=[{last},{last}]").startswith(
+        "schedule.phases.0.until: not set, expected an end"
+    )
+
+
+def test_near_below_far_wherever_they_stand() -> None:
+    message = problem("++sampling.near=3.0", "++sampling.far=2.0")
+    assert "sampling.near: found 3.0, expected below sampling.far = 2.0." in message
+
+
+def test_settings_that_would_be_overwritten_are_refused() -> None:
+    assert (
+        problem("++encoder.in_channels=3", "encoder=single")
+        == "encoder.in_channels: charnerf sets 'in_channels' of"
+        " charnerf.models.encoders.single.SingleHourglass itself; remove it."
+    )
+
+
+def test_all_problems_come_at_once() -> None:
+    message = problem("seed=abc", "budget.step=3", "+typo=1", "scale.width=-1", "combinator=mean")
+    lines = message.splitlines()
+    assert lines[0] == "The config has 4 problems:"
+    assert [line.strip().split(":")[0] for line in lines[1:]] == [
+        "typo",
+        "seed",
+        "scale.width",
+        "budget.step",
+    ]
+
+
+def test_broken_interpolations_are_named() -> None:
+    assert problem("seed=${scale.nothing}").startswith(
+        "seed: can not be read: Interpolation key 'scale.nothing'"
+    )
+
+
+@pytest.mark.parametrize("group", sorted({option.parent.name for option in OPTIONS}))
+def test_a_wrong_option_lists_the_right_ones(group: str) -> None:
+    options = ", ".join(sorted(option.stem for option in OPTIONS if option.parent.name == group))
+    assert problem(f"{group}=zzz") == f"{group}: found no option 'zzz', expected one of: {options}."
+
+
+def test_a_mistyped_option_or_group_names_the_nearest() -> None:
+    assert problem("experiment=no_mah").endswith("Did you mean 'no_mha'?")
+    assert problem("combinatr=mean") == "combinatr: unknown key; did you mean 'combinator'?"
+
+
+def test_what_can_not_be_read_is_shown() -> None:
+    assert problem("seed=[").startswith("seed=[: can not be read")
+
+
+def test_no_job_of_a_sweep_starts_if_one_is_wrong(conf: Path) -> None:
+    with pytest.raises(ConfigError) as caught:
+        check_command_line(["-m", "scale=smoke", "combinator=mean,sa", "seed=1,x"], conf=conf)
+    lines = str(caught.value).splitlines()
+    assert lines[0] == "2 of 4 jobs can not start, so none was; first `scale=smoke combinator=mean seed=x`:"
+    assert lines[1] == "seed: found 'x' (str), expected int."
+    check_command_line(["-m", "scale=smoke", "experiment=glob(*)"], conf=conf)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [one for one in OPTIONS if one.parent.name in MODEL_GROUPS],
+    ids=lambda one: one.with_suffix("").as_posix(),
+)
+def test_values_live_once(option: Path) -> None:
+    """A hyper-parameter that YAML sets has no default in Python."""
+    section = OmegaConf.load(ROOT / "conf" / option)
+    parameters = inspect.signature(get_object(str(section._target_))).parameters
+    for key in section:
+        if not str(key).startswith("_"):
+            found = parameters[str(key)].default
+            assert found is inspect.Parameter.empty, f"{option}: {key} has a default in Python too"
