@@ -1,23 +1,18 @@
 """Meshes to characters of a data set, in parallel processes; each is written aside and renamed."""
 
-import multiprocessing
-import os
-import threading
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import torch
 import trimesh
 from tqdm import tqdm
 
 from charnerf.capture.embree import CaptureOptions, capture_character
 from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
+from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
 from charnerf.data.mesh_files import write_surface_mesh
@@ -79,7 +74,7 @@ def capture_dataset(
     facts = made_by(options)
     try:
         with tqdm(total=len(files), desc="capture", unit="character", dynamic_ncols=True) as bar:
-            for file, message in _run(work, files, processes):
+            for file, message in in_processes(work, files, processes):
                 if message is None:
                     add_to_split(root, split, [file.stem], made_by=facts)
                 else:
@@ -153,39 +148,6 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
     if not files:
         raise DataError("meshes: found none, expected at least one file or folder.")
     return files
-
-
-def _run(
-    work: partial[str | None], files: Sequence[Path], processes: int | None
-) -> Iterator[tuple[Path, str | None]]:
-    """Each file with its message as it ends; processes begin afresh and inherit no thread's lock."""
-    count = min(processes or os.cpu_count() or 1, len(files))
-    if count <= 1:
-        for file in files:
-            yield file, work(file)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker) as pool:
-        waiting = {pool.submit(work, file): file for file in files}
-        try:
-            for done in as_completed(waiting):
-                yield waiting[done], done.result()
-        except BrokenProcessPool as err:
-            raise DataError(
-                "capture: a worker process died, perhaps for want of memory; what was captured is kept, "
-                "run it again for the rest with fewer processes."
-            ) from err
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _begin_worker() -> None:
-    """Use one thread, and end with the parent even if that is killed."""
-    torch.set_num_threads(1)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
 
 
 def _capture_file(

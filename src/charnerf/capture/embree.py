@@ -1,5 +1,7 @@
 """Pictures of a scene by Embree rays: RGBA, antialiased, texture-filtered, unlit by default."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -38,8 +40,8 @@ class CaptureOptions:
         sources: Projection of the source views.
         depth: Whether to keep depth pictures.
         light: How the surface is lit.
-        subsamples: Rays a pixel, squared: 3 means 9.
-        edge_subsamples: The same for pixels that the silhouette crosses.
+        subsamples: Rays a pixel.
+        edge_subsamples: Rays for each pixel that the silhouette crosses.
     """
 
     views: int = 48
@@ -47,8 +49,8 @@ class CaptureOptions:
     sources: Literal["orthographic", "pinhole"] = "orthographic"
     depth: bool = False
     light: AbstractLight = field(default_factory=Unlit)
-    subsamples: int = 3
-    edge_subsamples: int = 6
+    subsamples: int = 9
+    edge_subsamples: int = 36
 
     def __post_init__(self) -> None:
         """Check the options.
@@ -87,8 +89,8 @@ def capture_character(scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOp
     surface = surface_of_scene(scene)
     targets, sources = framing_cameras(surface, options)
     studio = _Studio(surface, options)
-    shots = [studio.shoot(targets[index]) for index in range(options.views)]
-    source_shots = [studio.shoot(sources[index]) for index in range(len(SOURCE_ORDER))]
+    shots = [studio.shoot(camera) for camera in _each(targets)]
+    source_shots = [studio.shoot(camera) for camera in _each(sources)]
     pictures = CharacterPictures(
         cameras=targets,
         images=np.stack([shot.rgba for shot in shots]),
@@ -98,6 +100,12 @@ def capture_character(scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOp
         depths=np.stack([shot.depth for shot in shots]) if options.depth else None,
     )
     return CapturedCharacter(pictures=pictures, surface=surface)
+
+
+def _each(cameras: Cameras) -> Iterator[Cameras]:
+    """One camera of shape () after the other, float32 as Embree's rays are."""
+    for index in range(len(cameras.orthographic)):
+        yield cameras[index].to(dtype=torch.float32)
 
 
 def framing_cameras(surface: SurfaceMesh, options: CaptureOptions) -> tuple[Cameras, Cameras]:
@@ -176,26 +184,24 @@ class _Studio:
 
     def _trace(self, camera: Cameras, pixels: np.ndarray) -> tuple[Hits, np.ndarray]:
         """Hits of rays through pixel positions (R, 2), and the rays' directions (R, 3)."""
-        rays = pixel_rays(camera, torch.from_numpy(pixels))
-        directions = rays.directions.float().numpy()
-        return self._caster.first_hits(rays.origins.float().numpy(), directions), directions
+        rays = pixel_rays(camera, torch.from_numpy(pixels.astype(np.float32)))
+        directions = rays.directions.numpy()
+        return self._caster.first_hits(rays.origins.numpy(), directions), directions
 
-    def _supersample(self, camera: Cameras, rows: np.ndarray, columns: np.ndarray, side: int) -> np.ndarray:
+    def _supersample(self, camera: Cameras, rows: np.ndarray, columns: np.ndarray, count: int) -> np.ndarray:
         """Linear RGBA (K, 4) of pixels (K,): mean colour of what is hit, alpha the share that is hit."""
-        steps = (np.arange(side) + 0.5) / side
-        inside = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        pixels = np.stack((columns, rows), axis=-1)[:, None] + inside
+        pixels = np.stack((columns, rows), axis=-1)[:, None] + _lattice(count)
         hits, directions = self._trace(camera, pixels.reshape(-1, 2))
         hit = np.flatnonzero(hits.triangles >= 0)
         triangles = hits.triangles[hit]
-        levels = self._texture_levels(_pixel_size(camera) / side)
+        levels = self._texture_levels(_pixel_size(camera) / math.sqrt(count))
         colors = shade(self._surface, triangles, hits.u[hit], hits.v[hit], levels)[:, :3]
         colors = self._options.light.lit(colors, self._normals[triangles], directions[hit])
-        count, owner = len(rows), hit // side**2
-        total = np.bincount(owner, minlength=count)
-        sums = [np.bincount(owner, weights=channel, minlength=count) for channel in colors.T]
+        number, owner = len(rows), hit // count
+        total = np.bincount(owner, minlength=number)
+        sums = [np.bincount(owner, weights=channel, minlength=number) for channel in colors.T]
         rgb = np.stack(sums, axis=-1) / np.maximum(total, 1)[:, None]
-        return np.concatenate((rgb, (total / side**2)[:, None]), axis=-1)
+        return np.concatenate((rgb, (total / count)[:, None]), axis=-1)
 
     def _texture_levels(self, footprint: float) -> np.ndarray:
         if footprint not in self._levels:
@@ -206,9 +212,8 @@ class _Studio:
         """Pixels (H, W) that an edge of a triangle may touch, and their neighbours."""
         spacing = 0.6 * _pixel_size(camera)  # nearer parts appear up to 1.7 times larger
         if spacing not in self._outline:
-            self._outline[spacing] = torch.from_numpy(
-                _points_on_edges(self._surface.triangles, 0.5 * spacing)
-            )
+            points = _points_on_edges(self._surface.triangles, 0.5 * spacing)
+            self._outline[spacing] = torch.from_numpy(points.astype(np.float32))
         pixels, _, in_front = project(camera, self._outline[spacing])
         indices = torch.floor(pixels[in_front]).long()
         columns = indices[:, 0].clamp(0, camera.width - 1)
@@ -216,6 +221,12 @@ class _Studio:
         touched = np.zeros((camera.height, camera.width), dtype=bool)
         touched[rows.numpy(), columns.numpy()] = True
         return ndimage.binary_dilation(touched, structure=np.ones((3, 3), dtype=bool))
+
+
+def _lattice(count: int) -> np.ndarray:
+    """Points (count, 2) evenly over the unit square, no two in one column: thin parts are not missed."""
+    index = np.arange(count) + 0.5
+    return np.stack((index / count, index * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0), axis=-1)
 
 
 def _pixel_size(camera: Cameras) -> float:

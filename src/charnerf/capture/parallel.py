@@ -1,0 +1,67 @@
+"""Work in parallel processes that end with their parent."""
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.context import BaseContext
+from typing import TypeVar
+
+import torch
+
+from charnerf.errors import DataError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def in_processes(
+    work: Callable[[Item], Result], items: Sequence[Item], processes: int | None
+) -> Iterator[tuple[Item, Result]]:
+    """Do work on items, yielding each with its result as it ends.
+
+    Args:
+        work: Function, with its arguments, that can be sent to another process.
+        items: What to work on; hashable is not needed.
+        processes: How many at once; None for one a core; 1 works in this process.
+
+    Raises:
+        DataError: If a process dies.
+    """
+    count = min(processes or os.cpu_count() or 1, len(items))
+    if count <= 1:
+        for item in items:
+            yield item, work(item)
+        return
+    with ProcessPoolExecutor(count, mp_context=_context(), initializer=_begin) as pool:
+        waiting = {pool.submit(work, item): item for item in items}
+        try:
+            for done in as_completed(waiting):
+                yield waiting[done], done.result()
+        except BrokenProcessPool as err:
+            raise DataError(
+                "A worker process died, perhaps for want of memory; what was written is kept, "
+                "run the command again for the rest, with fewer processes."
+            ) from err
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _context() -> BaseContext:
+    """Processes that inherit no thread's lock; where the system can, charnerf is imported once for all."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["charnerf.capture.dataset"])
+    return context
+
+
+def _begin() -> None:
+    """Use one thread, and end with the parent even if that is killed."""
+    torch.set_num_threads(1)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
