@@ -67,7 +67,7 @@ def look_at(positions: Tensor, targets: Tensor) -> Tensor:
     backward = safe_normalize(positions - targets)
     up = torch.zeros_like(backward)
     up[..., 2] = 1.0
-    vertical = backward[..., 2].abs() > 1.0 - 1e-9
+    vertical = backward[..., :2].abs().amax(-1) < 1e-6  # 1 - z^2 would vanish in float32 long before
     up[vertical] = up.new_tensor((0.0, 1.0, 0.0))
     right = safe_normalize(torch.linalg.cross(up, backward))
     true_up = torch.linalg.cross(backward, right)
