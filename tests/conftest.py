@@ -3,10 +3,10 @@
 import os
 from pathlib import Path
 
-import helpers
 import pytest
 import torch
 
+import helpers
 from charnerf.types import SourceViews
 
 ROOT = Path(__file__).resolve().parents[1]
