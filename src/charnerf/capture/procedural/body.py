@@ -76,7 +76,16 @@ def make_arms(figure: Figure, canvases: tuple[Canvas, Canvas]) -> list[Part]:
     for left, canvas in zip((True, False), canvases, strict=True):
         name = "left_arm" if left else "right_arm"
         shape = limb(figure.build.arm_points(left), ARM_SHARES, arm_radii(figure), figure)
-        parts.append(Part(name, shape, canvas.image()))
+        texels = canvas.image()
+        root = figure.build.arm_points(left)[0]
+        inside = root * np.array((0.3, 1.0, 1.0)) + np.array((0.0, 0.0, 0.1 * figure.build.arm_radius))
+        bridge = loft(
+            np.stack((inside, root)),
+            figure.build.arm_radius * np.array((0.9, 1.0)),
+            sides=figure.build.sides,
+            power=figure.build.power,
+        )
+        parts += [Part(name, shape, texels), flat(name, bridge, texels[-1].mean(axis=0) / 255.0)]
     return parts
 
 

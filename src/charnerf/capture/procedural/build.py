@@ -40,7 +40,7 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
         "arm": (0.50, 0.80), "arm_radius": (0.08, 0.13), "leg_radius": (0.10, 0.15), "hand": (0.12, 0.18), "foot": (0.26, 0.38),
     },
     "blocky": {
-        "head": (0.46, 0.70), "head_width_share": (0.85, 1.05), "head_depth_share": (0.70, 1.0), "neck": (-0.01, 0.01),
+        "head": (0.46, 0.70), "head_width_share": (0.85, 1.05), "head_depth_share": (0.70, 1.0), "neck": (-0.03, 0.0),
         "leg_share": (0.38, 0.52), "shoulder": (0.24, 0.40), "depth": (0.12, 0.20), "waist": (0.22, 0.34), "hip": (0.22, 0.32),
         "arm": (0.44, 0.62), "arm_radius": (0.08, 0.13), "leg_radius": (0.10, 0.15), "hand": (0.09, 0.13), "foot": (0.24, 0.32),
     },
@@ -107,12 +107,12 @@ class Build:
         side = 1.0 if left else -1.0
         top = side * max(self.hip - self.leg_radius, 0.85 * self.leg_radius)
         ankle = side * (max(self.hip - self.leg_radius, 0.9 * self.leg_radius) + self.leg_gap)
-        foot = self.foot_height
+        foot, bend = self.foot_height, 0.0 if self.sides == 4 else 0.015
         return np.array(
             (
                 (top, 0.0, self.hip_height + 0.03),
-                (0.5 * (top + ankle), -0.015, 0.5 * (self.hip_height + foot)),
-                (ankle, 0.01, foot * 0.8),
+                (0.5 * (top + ankle), -bend, 0.5 * (self.hip_height + foot)),
+                (ankle, 0.6 * bend, foot * 0.8),
             )
         )
 
@@ -175,10 +175,10 @@ def make_build(rng: np.random.Generator, name: str) -> Build:
         shoulder=value["shoulder"] * slim,
         depth=value["depth"],
         waist=value["waist"] * slim,
-        hip=max(value["hip"], 1.05 * value["leg_radius"]),
+        hip=value["waist"] * slim if blocky else max(value["hip"], 1.05 * value["leg_radius"]),
         arm=arm,
         arm_radius=value["arm_radius"] * slim,
-        leg_radius=value["leg_radius"],
+        leg_radius=min(value["leg_radius"], 0.49 * value["waist"]) if blocky else value["leg_radius"],
         hand=value["hand"] * slim,
         foot=value["foot"],
         **_pose(rng, name),

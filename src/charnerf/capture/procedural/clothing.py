@@ -257,7 +257,7 @@ def make_breastplate(figure: Figure) -> list[Part]:
 def make_tabard(figure: Figure) -> list[Part]:
     """Cloth hanging from the belt in front, and often behind."""
     build, palette, parts = figure.build, figure.palette, []
-    top, half = figure.trunk(0.2, 1.12)
+    top, half = figure.trunk(0.22, 1.01)
     bottom = build.hip_height * figure.between(0.35, 0.75)
     wide = build.waist * figure.between(0.35, 0.7)
     colour = palette.accent if figure.chance(0.5) else palette.main
@@ -269,11 +269,8 @@ def make_tabard(figure: Figure) -> list[Part]:
         columns = np.linspace(-1.0, 1.0, 3) * -ahead
         fall = np.linspace(1.0, 0.0, 4)[:, None]
         x = wide * columns * (1.0 - 0.15 * fall)
-        y = (
-            top[1]
-            + ahead * (half[1] + 0.05 * fall + 0.6 * build.leg_radius * np.clip(fall - 0.2, 0.0, 0.4))
-            + 0.0 * columns
-        )
+        front = half[1] + fall * max(0.03, 1.1 * build.leg_radius + 0.03 - half[1])
+        y = top[1] + ahead * front + 0.0 * columns
         z = top[2] - fall * (top[2] - bottom) + 0.0 * columns
         parts.append(Part("tabard", sheet(np.stack((x, y, z), axis=-1), 0.02), canvas.image()))
     return parts

@@ -309,7 +309,7 @@ def _pirate(figure: Figure, head: Head) -> list[Part]:
             "hat", _turned(figure, head, level, [(1.03, 0.0), (1.0, 0.18), (0.6, 0.34)]), darker(colour, 0.8)
         )
     )
-    badge = centre + np.array((0.0, -1.15 * deep, 0.2 * build.head))
+    badge = centre + np.array((0.0, -1.08 * deep + 0.07 * build.head, 0.2 * build.head))
     parts.append(
         flat(
             "hat",

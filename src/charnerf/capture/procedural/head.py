@@ -362,7 +362,7 @@ def make_horns(figure: Figure, head: Head) -> list[Part]:
         bend = np.array((side * out, 0.0, 0.3)) * steps + np.array((-0.3 * side * out, -curl, 0.7)) * steps**2
         if figure.surface == "robot":
             parts.append(
-                flat("horns", tube(root + long * 0.6 * steps * UP, np.full(5, 0.25 * thick), sides=6), colour)
+                flat("horns", tube(root + long * 0.6 * steps * UP, np.full(5, 0.4 * thick), sides=6), colour)
             )
             parts.append(
                 flat(
