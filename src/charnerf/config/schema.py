@@ -108,6 +108,7 @@ class RunConfig:
     renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
     sampling: Sampling
     surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
+    augmentation: _part("charnerf.data.augmentation", given=["used_views"])  # type: ignore[valid-type]
     loss: _part("charnerf.losses")  # type: ignore[valid-type]
     schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
     data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
+from charnerf.data.augmentation import AbstractAugmentation
 from charnerf.data.sampler import BatchRequest
 from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
@@ -37,6 +38,7 @@ class MixedDataset(Dataset[TrainBatch]):
         foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white.
         space_points: Labelled points a step, 0 where no loss reads them.
         reads_depth: Whether depth pictures are read.
+        augmentation: Changes a batch at random.
         seed: Of the run.
     """
 
@@ -49,6 +51,7 @@ class MixedDataset(Dataset[TrainBatch]):
         foreground_share: float,
         space_points: int,
         reads_depth: bool,
+        augmentation: AbstractAugmentation,
         seed: int,
     ) -> None:
         self.store = store
@@ -57,6 +60,7 @@ class MixedDataset(Dataset[TrainBatch]):
         self.foreground_share = foreground_share
         self.space_points = space_points
         self.reads_depth = reads_depth
+        self.augmentation = augmentation
         self.seed = seed
 
     def __getitem__(self, request: BatchRequest) -> TrainBatch:  # type: ignore[override]
@@ -70,7 +74,7 @@ class MixedDataset(Dataset[TrainBatch]):
         surfaces = [self.surface_of(one) for one in opened]
         surface = _sample_surfaces(surfaces, points, generator) if points else None
         space = self._space(opened, generator)
-        return TrainBatch(
+        batch = TrainBatch(
             names=tuple(one.character.name for one in opened),
             views=stack_views([one.character.sources for one in opened]),
             hull=_stack_hulls(opened),
@@ -87,6 +91,7 @@ class MixedDataset(Dataset[TrainBatch]):
             loss_weights=request.loss_weights,
             step=request.step,
         )
+        return self.augmentation(batch, generator)
 
     def _rays(
         self, one: OpenCharacter, num_rays: int, generator: torch.Generator

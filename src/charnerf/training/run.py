@@ -91,6 +91,7 @@ def build_data(
             foreground_share=sampling.foreground_share,
             space_points=sampling.space_points if losses.reads("occupancy") else 0,
             reads_depth=losses.reads("depth"),
+            augmentation=build_part(cfg.augmentation, {"used_views": model.views}),
             seed=cfg.seed,
         )
 
