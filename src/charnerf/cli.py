@@ -307,6 +307,47 @@ def report(
     commands.report(folder)
 
 
+@app.command(epilog=DEBUG_NOTE)
+def check(
+    weights: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[RUN_OR_WEIGHTS]",
+            help="A run folder, a .ckpt, a .safetensors, or `released`: its field is checked too.",
+        ),
+    ] = None,
+    *,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For check.json and check.png."),
+    ] = Path("outputs/check"),
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data",
+            metavar="DATASET",
+            exists=True,
+            file_okay=False,
+            help="Data set of the character that the field is checked with; an embedded one if left out.",
+        ),
+    ] = None,
+    character: Annotated[
+        str | None, typer.Option("--character", metavar="NAME", help="Its name; the first one if left out.")
+    ] = None,
+    device: Device = "auto",
+    trust: Trusted = None,
+) -> None:
+    """Measure every numerical kernel, and a trained field, on stiff and extreme cases.
+
+    Each row compares with a reference of higher precision and has a bound; the usual formulas stand beside
+    and have to fail. Exit status 1 if any bound is broken.
+    """
+    from charnerf import commands
+
+    if not commands.check(weights, output, data=data, character=character, device=device, trust=trust or []):
+        raise typer.Exit(FAILED)
+
+
 def main() -> None:
     """Run a command and leave with its exit status."""
     sys.exit(run(sys.argv[1:]))

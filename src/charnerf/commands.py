@@ -16,6 +16,7 @@ from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.lights import Headlight, Unlit
 from charnerf.data.characters import load_character
+from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
@@ -25,6 +26,7 @@ from charnerf.meshing.build import build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.model_api import Model
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
+from charnerf.types import Cameras, SourceViews
 
 LIGHTS = {"unlit": Unlit, "headlight": Headlight}
 RENDERERS = {
@@ -211,3 +213,65 @@ def reconstruct(
 def report(folder: Path) -> None:
     """Write the report over all runs below a folder."""
     say(f"report: {write_folder_report(folder)}")
+
+
+CHECKED_SIZE = 48  # pixels: each one is a ray of its own
+CHECKED_SEED = 20  # of the embedded character that a field is checked with
+
+
+def check(
+    weights: str | None,
+    output: Path,
+    *,
+    data: Path | None,
+    character: str | None,
+    device: str,
+    trust: Sequence[str],
+) -> bool:
+    """Run the catalogue of stiff cases, print its table and write JSON and plot; say whether it passed."""
+    from charnerf.stability import TrainedField, run_check
+
+    trained = None
+    if weights is not None:
+        model = load_model(None if weights == "released" else Path(weights), device=device, trust=trust)
+        views, camera = _checked_character(model, data, character)
+        trained = TrainedField(model.network, model.renderer, views.to(model.device), camera.to(model.device))
+    result = run_check(trained, devices=None if device == "auto" else [pick_device(device)])
+    output.mkdir(parents=True, exist_ok=True)
+    result.to_json(output / "check.json")
+    result.plot(output / "check.png")
+    sys.stdout.write(result.table() + "\n")
+    say(f"{output / 'check.json'}, {output / 'check.png'}: {'passed' if result.passed else 'BROKEN'}.")
+    return result.passed
+
+
+def _checked_character(model: Model, data: Path | None, character: str | None) -> tuple[SourceViews, Cameras]:
+    """Source views (B = 1) of a data set's or of the embedded character, and a small camera of it."""
+    if data is not None:
+        splits = read_dataset(data).splits
+        names = [name for split in splits.values() for name in split]
+        if not names:
+            raise DataError(f"{data}: found no characters, expected at least one.")
+        known = load_character(data, character or names[0])
+        return known.sources, _small(known.cameras[0])
+    from charnerf.capture.embree import capture_character
+    from charnerf.capture.procedural.character import make_character
+
+    options = CaptureOptions(views=3, size=model.image_size, light=Unlit())
+    pictures = capture_character(make_character(CHECKED_SEED), options).pictures
+    drawings = torch.from_numpy(pictures.source_images).permute(0, 3, 1, 2)[None].float() / 255.0
+    flags = torch.ones(drawings.shape[:2], dtype=torch.bool)
+    views = SourceViews(drawings, pictures.source_cameras[None].to(torch.float32), flags, ~flags)
+    return views, _small(pictures.cameras[1].to(torch.float32))
+
+
+def _small(camera: Cameras) -> Cameras:
+    """The same view with few pixels."""
+    factor = CHECKED_SIZE / max(camera.width, camera.height)
+    return replace(
+        camera,
+        focal=camera.focal * factor,
+        principal_point=camera.principal_point * factor,
+        width=round(camera.width * factor),
+        height=round(camera.height * factor),
+    )
