@@ -24,14 +24,28 @@ __all__ = [
     "CameraRendering",
     "EvaluatedModel",
     "EvaluatedRenderer",
+    "MadeMesh",
     "MakeMesh",
     "evaluate",
     "fixed_views",
     "write_metrics",
 ]
 
-MakeMesh = Callable[[Any], tuple[trimesh.Trimesh, LeftOut]]
-"""From a scene to its mesh (world frame, m) and the grid cells that were left out."""
+
+class MadeMesh(Protocol):
+    """A mesh, world frame, m, and what was left out; `meshing.build.build_mesh` answers such a one."""
+
+    @property
+    def mesh(self) -> trimesh.Trimesh:
+        """The surface."""
+
+    @property
+    def left_out(self) -> LeftOut:
+        """Work that was not done."""
+
+
+MakeMesh = Callable[[Any, SourceViews], MadeMesh]
+"""From a scene and its drawings (B = 1) to its mesh."""
 
 
 class EvaluatedModel(Protocol):
@@ -113,7 +127,7 @@ def evaluate(
         output: Folder for the predictions, `images/NAME/000.png` (RGBA, named like the data set's), and one
         contact sheet a
             character, `images/NAME/sheet.png`; None keeps none.
-        mesh: Makes a scene's mesh for Chamfer and F-score; None leaves them null.
+        mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them null.
         device: Where the model is.
         baselines: Whether to measure `white` and `visual_hull` too.
         train_seconds: Training time to report; None where it is unknown.
@@ -131,11 +145,12 @@ def evaluate(
     state = Collected(device, ("ours", "white", "visual_hull") if baselines else ("ours",))
     with (
         state.watch,
-        tqdm(total=len(names), desc=f"evaluate {split}", unit="character", disable=not progress) as bar,
+        tqdm(total=0, desc=f"evaluate {split}", unit="view", disable=not progress) as bar,
     ):
-        for name in names:
+        for place, name in enumerate(names):
             character = load_character(root, name)
             indices = fixed_views(character, views)
+            bar.total = bar.n + len(indices) * (len(names) - place)  # the others are taken to have as many
             _evaluate_character(state, model, renderer, character, indices, output=output, mesh=mesh, bar=bar)
     return collected_metrics(state, names, split=split, train_seconds=train_seconds)
 
@@ -163,8 +178,8 @@ def _evaluate_character(
                 rendering = renderer.render_camera(scene, character.cameras[index].to(watch.device))
             state.left_out += rendering.left_out
             drawn["ours"].append(to_cpu(rendering.finest, name=f"{name}, view {index}"))
-            bar.update(1.0 / len(indices))
-        surface = None if mesh is None else _make_mesh(state, mesh, scene)
+            bar.update()
+        surface = None if mesh is None else _make_mesh(state, mesh, scene, sources)
     truth = None if character.mesh_file is None else surface_error.true_points(character.mesh_file)
     hull_mesh = _draw_baselines(state, drawn, character, indices)
     images = character.images(indices)
@@ -183,15 +198,15 @@ def _evaluate_character(
         save_sheet(output / "images" / name / "sheet.png", character, indices, images, drawn)
 
 
-def _make_mesh(state: Collected, mesh: MakeMesh, scene: Any) -> trimesh.Trimesh | str:
+def _make_mesh(state: Collected, mesh: MakeMesh, scene: Any, sources: SourceViews) -> trimesh.Trimesh | str:
     """The scene's mesh, or why it has none."""
     try:
         with state.watch.stage("mesh"):
-            surface, left_out = mesh(scene)
+            made = mesh(scene, sources)
     except CharNeRFError as error:
         return str(error)
-    state.left_out += left_out
-    return surface
+    state.left_out += made.left_out
+    return made.mesh
 
 
 def _draw_baselines(

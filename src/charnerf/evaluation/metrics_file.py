@@ -59,11 +59,12 @@ def collected_metrics(
 
 def _baselines(state: Collected, names: Sequence[str]) -> dict[str, Any]:
     """Every metric of the baselines; the hull's seconds too."""
-    found = {
-        method: summarize([scores[name] for name in names])
-        for method, scores in state.scores.items()
-        if method != "ours"
-    }
+    found: dict[str, Any] = {}
+    for method, by_name in state.scores.items():
+        if method != "ours":
+            scores = [by_name[name] for name in names]
+            found[method] = summarize(scores)
+            found[method]["by_azimuth"] = by_azimuth([each.views for each in scores], VIEW_KEYS)
     if "visual_hull" in found:
         found["visual_hull"]["seconds"] = {
             "encode": state.watch.median_seconds("hull_encode"),

@@ -46,6 +46,9 @@ class RayMesh:
         """First hits of rays with origins and unit directions (R, 3)."""
         origins = np.ascontiguousarray(origins, dtype=np.float32)
         directions = np.ascontiguousarray(directions, dtype=np.float32)
+        if not len(origins):
+            none = np.zeros(0, np.int64)
+            return Hits(none, np.zeros((0, 3), np.float32), np.zeros(0, np.float32), none)
         answer = self._scene.run(origins, directions, output=True)
         rays = np.flatnonzero(answer["primID"] >= 0)
         distances = answer["tfar"][rays]
@@ -54,6 +57,8 @@ class RayMesh:
 
     def occluded(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Whether rays with origins and unit directions (R, 3) hit anything, (R,), bool."""
+        if not len(origins):
+            return np.zeros(0, dtype=bool)
         answer = self._scene.run(
             np.ascontiguousarray(origins, dtype=np.float32),
             np.ascontiguousarray(directions, dtype=np.float32),

@@ -6,23 +6,22 @@ import numpy as np
 import torch
 import trimesh
 
+from charnerf.data.scene_mesh import surface_of_scene
+from charnerf.data.surface import AreaSurface, visible_surface_points
+from charnerf.data.surface_mesh import interpolate
+from charnerf.data.visibility import see_points
 from charnerf.errors import DataError
 from charnerf.evaluation.metrics import F_SCORE_RADIUS_M, surface_distances
-from charnerf.evaluation.ray_mesh import RayMesh
 from charnerf.types import Cameras
 
 NUM_POINTS = 50_000
 """Points a surface: their spacing alone puts equal surfaces of 2 square metres about 3 mm apart."""
-_NUM_CAMERAS = 48
-_RAY_OFFSET = 2e-3
 _SURFACE_KEYS = ("chamfer_mm", "f_score")
 
 
 def true_points(mesh_file: Path, *, seed: int = 0) -> np.ndarray:
-    """Points (N, 3) of the captured mesh's outer surface, m."""
-    from charnerf.data.surface import visible_surface_points
-
-    return np.asarray(visible_surface_points(mesh_file, NUM_POINTS, seed)[0])
+    """Points (NUM_POINTS, 3) of the captured mesh's outer surface, m."""
+    return visible_surface_points(mesh_file, NUM_POINTS, seed)[0]
 
 
 def seen_points(
@@ -32,7 +31,7 @@ def seen_points(
 
     Args:
         mesh: World frame, m.
-        cameras: (N,); at most 48 of them, evenly chosen, are asked.
+        cameras: (N,).
         num_points: How many are drawn before the hidden ones are dropped.
         seed: Of the draw.
 
@@ -42,25 +41,15 @@ def seen_points(
     Raises:
         DataError: If the mesh has no area, or no camera sees any of it.
     """
-    if not len(mesh.faces) or not float(mesh.area) > 0.0:
-        raise DataError(f"mesh: found {len(mesh.faces)} faces of area {mesh.area:g}, expected a surface.")
-    points, faces = trimesh.sample.sample_surface(mesh, num_points, seed=np.random.default_rng(seed))
-    points, normals = np.asarray(points, np.float32), np.asarray(mesh.face_normals[faces], np.float32)
-    rays = RayMesh(mesh.vertices, mesh.faces)
-    hidden = np.arange(num_points)
-    count = int(cameras.shape[0])
-    for index in torch.linspace(0, count - 1, min(count, _NUM_CAMERAS)).round().long().tolist():
-        pose = cameras.world_from_camera[index].cpu().numpy()
-        here = points[hidden]
-        if bool(cameras.orthographic[index]):
-            towards = np.broadcast_to(pose[:3, 2], here.shape)
-        else:
-            towards = pose[:3, 3] - here
-            towards = towards / np.linalg.norm(towards, axis=-1, keepdims=True)
-        facing = np.sign((normals[hidden] * towards).sum(-1, keepdims=True))
-        starts = here + _RAY_OFFSET * facing * normals[hidden]
-        hidden = hidden[rays.occluded(starts, towards)]
-    seen = np.delete(points, hidden, axis=0)
+    bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    if not len(bare.faces) or not float(bare.area) > 0.0:
+        raise DataError(
+            f"mesh: found {len(bare.faces)} faces without area, expected a surface; lower its level."
+        )
+    surface = surface_of_scene(bare)
+    draw = AreaSurface(surface).draw(num_points, torch.Generator().manual_seed(seed))
+    points = interpolate(surface.triangles[draw.triangles], draw.u, draw.v).astype(np.float32)
+    seen = points[see_points(surface, points, draw.triangles, cameras).visible]
     if not len(seen):
         raise DataError(
             "mesh: none of its surface is seen by a camera, expected it to stand where the cameras look; "

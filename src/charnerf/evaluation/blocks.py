@@ -1,0 +1,196 @@
+"""A report as a list of blocks, written as Markdown (pictures linked) and as one HTML file (inside)."""
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import singledispatch
+from pathlib import Path
+
+from PIL import Image
+
+_STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f23; background: #fff; max-width: 1180px;
+       margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; margin-bottom: .3rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
+p.lead { font-size: 1.1rem; }
+table { border-collapse: collapse; margin: .8rem 0; font-variant-numeric: tabular-nums;
+        display: block; overflow-x: auto; }
+th, td { padding: .3rem .7rem; text-align: right; border-bottom: 1px solid #e3e5e8; white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; }
+thead th { border-bottom: 2px solid #9aa0a8; font-weight: 600; }
+tbody tr:first-child td { font-weight: 600; }
+table.plain tbody tr:first-child td { font-weight: 400; }
+figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
+figcaption { color: #5c626b; font-size: .9rem; }
+pre { background: #f5f6f8; padding: .8rem 1rem; overflow-x: auto; border-radius: 4px; font-size: .85rem; }
+details summary { cursor: pointer; color: #3a5a8c; }
+"""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A title of level 1 or 2."""
+
+    text: str
+    level: int = 2
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph; the lead says the result in one breath."""
+
+    text: str
+    lead: bool = False
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list of short facts."""
+
+    items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Code:
+    """Lines to type or to keep; `folded` under a title."""
+
+    text: str
+    folded: str | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as text; the first row may be the one that matters (`emphasis`)."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    emphasis: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture file below the report's folder."""
+
+    path: Path
+    caption: str
+
+
+Block = Heading | Text | Bullets | Code | Table | Picture
+
+
+@singledispatch
+def _markdown(block: Block, folder: Path) -> str:
+    """One block as Markdown."""
+    raise TypeError(type(block).__name__)
+
+
+@_markdown.register
+def _(block: Heading, folder: Path) -> str:
+    return f"{'#' * block.level} {block.text}"
+
+
+@_markdown.register
+def _(block: Text, folder: Path) -> str:
+    return block.text
+
+
+@_markdown.register
+def _(block: Bullets, folder: Path) -> str:
+    return "\n".join(f"- {item}" for item in block.items)
+
+
+@_markdown.register
+def _(block: Code, folder: Path) -> str:
+    title = f"{block.folded}:\n\n" if block.folded else ""
+    return f"{title}```\n{block.text.rstrip()}\n```"
+
+
+@_markdown.register
+def _(block: Table, folder: Path) -> str:
+    rule = ["---"] + ["---:"] * (len(block.header) - 1)
+    lines = [block.header, rule, *block.rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+@_markdown.register
+def _(block: Picture, folder: Path) -> str:
+    link = block.path.relative_to(folder).as_posix().replace(" ", "%20")
+    return f"![{block.caption}]({link})\n\n*{block.caption}*"
+
+
+@singledispatch
+def _html(block: Block) -> str:
+    """One block as HTML."""
+    raise TypeError(type(block).__name__)
+
+
+@_html.register
+def _(block: Heading) -> str:
+    return f"<h{block.level}>{html.escape(block.text)}</h{block.level}>"
+
+
+@_html.register
+def _(block: Text) -> str:
+    kind = ' class="lead"' if block.lead else ""
+    return f"<p{kind}>{html.escape(block.text)}</p>"
+
+
+@_html.register
+def _(block: Bullets) -> str:
+    return "<ul>" + "".join(f"<li>{html.escape(item)}</li>" for item in block.items) + "</ul>"
+
+
+@_html.register
+def _(block: Code) -> str:
+    inner = f"<pre>{html.escape(block.text.rstrip())}</pre>"
+    return (
+        f"<details><summary>{html.escape(block.folded)}</summary>{inner}</details>" if block.folded else inner
+    )
+
+
+@_html.register
+def _(block: Table) -> str:
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    rows = "".join(line(row, "td") for row in block.rows)
+    kind = "" if block.emphasis else ' class="plain"'
+    return f"<table{kind}><thead>{line(block.header, 'th')}</thead><tbody>{rows}</tbody></table>"
+
+
+@_html.register
+def _(block: Picture) -> str:
+    caption = html.escape(block.caption)
+    picture = f'<img alt="{caption}" src="{_embedded(block.path)}">'
+    return f"<figure>{picture}<figcaption>{caption}</figcaption></figure>"
+
+
+def _embedded(path: Path) -> str:
+    """A picture as a data URL: small files as they are, large ones as JPEG of high quality."""
+    content, kind = path.read_bytes(), "png"
+    if len(content) > 200_000:
+        buffer = io.BytesIO()
+        with Image.open(path) as picture:
+            picture.convert("RGB").save(buffer, format="JPEG", quality=90, subsampling=0)
+        if buffer.tell() < len(content):
+            content, kind = buffer.getvalue(), "jpeg"
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def to_markdown(blocks: Sequence[Block], folder: Path) -> str:
+    """A report as Markdown, its pictures linked from the folder."""
+    return "\n\n".join(_markdown(block, folder) for block in blocks) + "\n"
+
+
+def to_html(title: str, blocks: Sequence[Block]) -> str:
+    """A report as one HTML file that needs nothing else."""
+    body = "\n".join(_html(block) for block in blocks)
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<body>\n{body}\n</body>\n</html>\n"
+    )
