@@ -230,11 +230,11 @@ def _lattice(count: int) -> np.ndarray:
 
 
 def _pixel_size(camera: Cameras) -> float:
-    """Side of a pixel at the character's centre, m."""
-    focal = float(camera.focal[0])
-    if bool(camera.orthographic):
-        return 1.0 / focal
-    return float(np.linalg.norm(camera.world_from_camera[:3, 3].numpy() - np.array(CENTRE))) / focal
+    """Side of a pixel at the character's centre, m, to four digits: cameras at one distance share it."""
+    distance = 1.0
+    if not bool(camera.orthographic):
+        distance = float(np.linalg.norm(camera.world_from_camera[:3, 3].numpy() - np.array(CENTRE)))
+    return float(f"{distance / float(camera.focal[0]):.4g}")
 
 
 def _points_on_edges(triangles: np.ndarray, spacing: float) -> np.ndarray:
