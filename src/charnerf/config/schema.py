@@ -32,6 +32,7 @@ class Scale:
     phase_rays: list[Count]
     phase_surface_points: list[CountOrZero]
     space_points: CountOrZero
+    learning_rate: Annotated[float, Above(0)]
     batch_characters: Count
     steps: Count | None
     seconds: Annotated[float, Above(0)] | None
