@@ -5,56 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from charnerf.capture.procedural.proportions import RANGES
 from charnerf.capture.procedural.shapes import Array
-
-# Ranges in metres for a figure 2 m tall, unless a name says otherwise (share: of head height, of what is left below the neck).
-RANGES: dict[str, dict[str, tuple[float, float]]] = {
-    "realistic": {
-        "head": (0.25, 0.30), "head_width_share": (0.66, 0.80), "head_depth_share": (0.80, 0.95), "neck": (0.05, 0.09),
-        "leg_share": (0.53, 0.58), "shoulder": (0.19, 0.26), "depth": (0.105, 0.15), "waist": (0.125, 0.175), "hip": (0.15, 0.19),
-        "arm": (0.54, 0.66), "arm_radius": (0.042, 0.062), "leg_radius": (0.075, 0.10), "hand": (0.07, 0.09), "foot": (0.22, 0.28),
-    },
-    "stylised": {
-        "head": (0.32, 0.46), "head_width_share": (0.72, 0.95), "head_depth_share": (0.75, 1.0), "neck": (0.02, 0.08),
-        "leg_share": (0.45, 0.56), "shoulder": (0.20, 0.32), "depth": (0.11, 0.18), "waist": (0.13, 0.22), "hip": (0.16, 0.24),
-        "arm": (0.50, 0.66), "arm_radius": (0.05, 0.09), "leg_radius": (0.08, 0.12), "hand": (0.08, 0.13), "foot": (0.24, 0.32),
-    },
-    "chunky": {
-        "head": (0.42, 0.58), "head_width_share": (0.80, 1.05), "head_depth_share": (0.80, 1.0), "neck": (0.0, 0.05),
-        "leg_share": (0.38, 0.50), "shoulder": (0.28, 0.42), "depth": (0.16, 0.25), "waist": (0.20, 0.32), "hip": (0.22, 0.30),
-        "arm": (0.46, 0.64), "arm_radius": (0.085, 0.13), "leg_radius": (0.11, 0.15), "hand": (0.12, 0.18), "foot": (0.28, 0.38),
-    },
-    "chibi": {
-        "head": (0.78, 1.05), "head_width_share": (0.88, 1.15), "head_depth_share": (0.80, 1.05), "neck": (-0.03, 0.02),
-        "leg_share": (0.30, 0.46), "shoulder": (0.18, 0.30), "depth": (0.13, 0.21), "waist": (0.17, 0.28), "hip": (0.18, 0.26),
-        "arm": (0.28, 0.44), "arm_radius": (0.06, 0.10), "leg_radius": (0.085, 0.125), "hand": (0.08, 0.13), "foot": (0.22, 0.32),
-    },
-    "giant": {
-        "head": (0.24, 0.36), "head_width_share": (0.75, 1.0), "head_depth_share": (0.8, 1.0), "neck": (-0.06, 0.04),
-        "leg_share": (0.34, 0.44), "shoulder": (0.40, 0.55), "depth": (0.22, 0.34), "waist": (0.22, 0.40), "hip": (0.22, 0.32),
-        "arm": (0.62, 0.86), "arm_radius": (0.10, 0.16), "leg_radius": (0.12, 0.17), "hand": (0.13, 0.20), "foot": (0.30, 0.40),
-    },
-    "blob": {
-        "head": (0.62, 0.90), "head_width_share": (0.85, 1.1), "head_depth_share": (0.70, 0.95), "neck": (-0.16, -0.05),
-        "leg_share": (0.26, 0.40), "shoulder": (0.28, 0.42), "depth": (0.24, 0.36), "waist": (0.30, 0.46), "hip": (0.28, 0.40),
-        "arm": (0.50, 0.80), "arm_radius": (0.08, 0.13), "leg_radius": (0.10, 0.15), "hand": (0.12, 0.18), "foot": (0.26, 0.38),
-    },
-    "blocky": {
-        "head": (0.46, 0.70), "head_width_share": (0.85, 1.05), "head_depth_share": (0.70, 1.0), "neck": (-0.03, 0.0),
-        "leg_share": (0.38, 0.52), "shoulder": (0.24, 0.40), "depth": (0.12, 0.20), "waist": (0.22, 0.34), "hip": (0.22, 0.32),
-        "arm": (0.44, 0.62), "arm_radius": (0.08, 0.13), "leg_radius": (0.10, 0.15), "hand": (0.09, 0.13), "foot": (0.24, 0.32),
-    },
-}  # fmt: skip
-CHANCES = {
-    "realistic": 0.22, "stylised": 0.22, "chunky": 0.14, "chibi": 0.16, "giant": 0.07, "blob": 0.07, "blocky": 0.12,
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Build:
     """Proportions of one character, m; its crown is at 2 m before hats, and all is scaled at the end.
 
-    sides and power are the cross-sections of limbs and trunk (see shapes.loft); arm_angle_deg is how far arms hang below level.
+    sides and power are the cross-sections of limbs and trunk (see shapes.loft); arm_angle_deg is how far arms
+    hang below level.
     """
 
     name: str
@@ -137,12 +97,16 @@ def _pose(rng: np.random.Generator, name: str) -> dict[str, float]:
     down_chance = 0.45 if name == "blocky" else 0.14
     if kind < down_chance:
         return {
-            "arm_angle_deg": rng.uniform(68.0, 86.0), "elbow_deg": rng.uniform(0.0, 8.0), "arm_forward_deg": rng.uniform(0.0, 18.0),
-        }  # fmt: skip
+            "arm_angle_deg": rng.uniform(68.0, 86.0),
+            "elbow_deg": rng.uniform(0.0, 8.0),
+            "arm_forward_deg": rng.uniform(0.0, 18.0),
+        }
     if kind < down_chance + 0.24:
         return {
-            "arm_angle_deg": rng.uniform(25.0, 60.0), "elbow_deg": rng.uniform(0.0, 12.0), "arm_forward_deg": rng.uniform(0.0, 30.0),
-        }  # fmt: skip
+            "arm_angle_deg": rng.uniform(25.0, 60.0),
+            "elbow_deg": rng.uniform(0.0, 12.0),
+            "arm_forward_deg": rng.uniform(0.0, 30.0),
+        }
     bent = rng.uniform(0.0, 8.0) if rng.uniform() < 0.35 else 0.0
     return {
         "arm_angle_deg": bent,

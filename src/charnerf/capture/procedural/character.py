@@ -3,11 +3,12 @@
 import numpy as np
 import trimesh
 
-from charnerf.capture.procedural import body, clothing, props
+from charnerf.capture.procedural import armour, backs, body, clothing, props
+from charnerf.capture.procedural.ears import make_ears, make_horns
 from charnerf.capture.procedural.figure import Figure, make_figure
 from charnerf.capture.procedural.hair import make_beard, make_hair
 from charnerf.capture.procedural.hats import make_hat
-from charnerf.capture.procedural.head import Head, make_ears, make_head, make_head_form, make_horns
+from charnerf.capture.procedural.head import make_head, make_head_form
 from charnerf.capture.procedural.outfit import Outfit, make_outfit
 from charnerf.capture.procedural.parts import Part, assemble, pixelated, to_world
 from charnerf.capture.procedural.voxels import make_voxel_parts
@@ -35,7 +36,7 @@ def _head(figure: Figure) -> list[Part]:
     return parts
 
 
-def _worn(figure: Figure, outfit: Outfit, head: Head | None = None) -> list[Part]:
+def _worn(figure: Figure, outfit: Outfit) -> list[Part]:
     """Modelled clothes, armour and carried things."""
     fighter = figure.chance(0.35)
     plain = figure.build.name == "realistic" and not fighter
@@ -50,35 +51,40 @@ def _worn(figure: Figure, outfit: Outfit, head: Head | None = None) -> list[Part
     if figure.chance(0.14 * calm + 0.12 * fighter):
         parts += clothing.make_cape(figure)
     elif figure.chance(0.16 * calm):
-        parts += props.make_backpack(figure)
+        parts += backs.make_backpack(figure)
     if figure.chance(0.14 * calm):
         parts += clothing.make_scarf(figure)
     if figure.chance(0.35 * calm) and not outfit.barefoot:
-        parts += clothing.make_boots(figure)
+        parts += armour.make_boots(figure)
+    return parts + _gear(figure, calm, fighter)
+
+
+def _gear(figure: Figure, calm: float, fighter: bool) -> list[Part]:
+    """Armour, things held, tails and wings; calm scales how likely most are."""
+    parts: list[Part] = []
     if figure.chance(0.2 * calm + 0.25 * fighter):
-        parts += clothing.make_bracers(figure)
+        parts += armour.make_bracers(figure)
     if figure.chance(0.06 * calm + 0.4 * fighter):
-        parts += clothing.make_pauldrons(figure)
+        parts += armour.make_pauldrons(figure)
     if figure.chance(0.05 * calm + 0.4 * fighter):
-        parts += clothing.make_breastplate(figure)
+        parts += armour.make_breastplate(figure)
     if figure.chance(0.08 * calm + 0.35 * fighter):
         parts += props.make_held(figure)
     if figure.chance({"fur": 0.7, "creature": 0.35}.get(figure.surface, 0.02)):
-        parts += props.make_tail(figure)
+        parts += backs.make_tail(figure)
     if figure.chance({"creature": 0.15, "robot": 0.06}.get(figure.surface, 0.03)):
-        parts += props.make_wings(figure)
+        parts += backs.make_wings(figure)
     if figure.chance(0.015 * calm):
-        parts += props.make_flag(figure)
+        parts += backs.make_flag(figure)
     return parts
 
 
 def _humanoid(figure: Figure) -> list[Part]:
+    """Everything but cubes."""
     outfit = make_outfit(figure)
     ribs = figure.surface == "skeleton" and outfit.bare_trunk
     trunk = (
-        clothing.make_ribs(figure)
-        if ribs
-        else [Part("trunk", body.trunk_shape(figure), outfit.trunk.image())]
+        armour.make_ribs(figure) if ribs else [Part("trunk", body.trunk_shape(figure), outfit.trunk.image())]
     )
     loose = figure.between(0.0, 0.7) if figure.chance(0.3) else 0.0
     feet = figure.palette.skin if outfit.barefoot else figure.palette.boots
@@ -93,7 +99,7 @@ def _humanoid(figure: Figure) -> list[Part]:
         *_worn(figure, outfit),
     ]
     if figure.surface == "robot" and figure.chance(0.7):
-        parts += clothing.make_robot_joints(figure)
+        parts += armour.make_robot_joints(figure)
     return parts
 
 
@@ -124,7 +130,8 @@ def make_character(seed: int) -> trimesh.Scene:
         seed: Any non-negative integer; equal seeds give equal characters.
 
     Returns:
-        A scene in the world frame (metres, +Z up, facing -Y, 2 m tall, feet on z = 0, bounding box centred on the z axis): named
-        geometries made of closed parts, sharing one material with an sRGB base-colour texture.
+        A scene in the world frame (metres, +Z up, facing -Y, 2 m tall, feet on z = 0, bounding box
+        centred on the z axis): named geometries made of closed parts, sharing one material with an sRGB
+        base-colour texture.
     """
     return assemble(make_parts(seed))

@@ -1,22 +1,20 @@
-"""Data sets of embedded characters: generated once, kept in a cache folder, resumed where they were interrupted."""
+"""Data sets of embedded characters: generated once, kept in a cache folder, resumed if interrupted."""
 
 import hashlib
 import json
-import multiprocessing
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-import torch
 from tqdm import tqdm
 
 from charnerf.capture.dataset import capture_scene_to, made_by
 from charnerf.capture.embree import CaptureOptions
+from charnerf.capture.parallel import in_processes
 from charnerf.capture.procedural.character import make_character
 from charnerf.data.characters import remove_partial_characters
 from charnerf.data.layout import (
@@ -47,11 +45,11 @@ def character_seed(seed: int, split: str, index: int) -> int:
 
 def generate_dataset(
     root: str | Path,
-    *,
     train: int,
     val: int,
     test: int,
     seed: int,
+    *,
     views: int = 48,
     size: int = 128,
     processes: int | None = None,
@@ -91,10 +89,14 @@ def generate_dataset(
         missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
         work = partial(_make, root=root, seed=seed, options=options)
         with tqdm(
-            total=len(wanted), initial=len(wanted) - len(missing), desc="embedded characters", unit="character",
-            dynamic_ncols=True, disable=not missing,
-        ) as bar:  # fmt: skip
-            for split, index in _run(work, missing, processes):
+            total=len(wanted),
+            initial=len(wanted) - len(missing),
+            desc="embedded characters",
+            unit="character",
+            dynamic_ncols=True,
+            disable=not missing,
+        ) as bar:
+            for (split, index), _ in in_processes(work, missing, processes):
                 add_to_split(root, split, [_name(split, index)])
                 bar.update()
     return read_dataset(root)
@@ -158,7 +160,7 @@ class ProceduralData:
 
 
 def default_cache() -> Path:
-    """charnerf's folder in the user's cache: $XDG_CACHE_HOME or ~/.cache."""
+    """Charnerf's folder in the user's cache: $XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "charnerf"
 
@@ -204,30 +206,6 @@ def _begin(root: Path, wanted: Sequence[tuple[str, int]], facts: dict[str, Any])
 def _make(pair: tuple[str, int], *, root: Path, seed: int, options: CaptureOptions) -> None:
     """Generate and capture one character."""
     capture_scene_to(root, _name(*pair), make_character(character_seed(seed, *pair)), options)
-
-
-def _run(
-    work: partial[None], pairs: Sequence[tuple[str, int]], processes: int | None
-) -> Iterator[tuple[str, int]]:
-    """Each character as it is done; fresh processes, which inherit no thread's lock."""
-    count = min(processes or os.cpu_count() or 1, len(pairs))
-    if count <= 1:
-        for pair in pairs:
-            work(pair)
-            yield pair
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        count, mp_context=context, initializer=torch.set_num_threads, initargs=(1,)
-    ) as pool:
-        waiting = {pool.submit(work, pair): pair for pair in pairs}
-        try:
-            for done in as_completed(waiting):
-                done.result()
-                yield waiting[done]
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
 @contextmanager

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from charnerf.capture.procedural.build import CHANCES, Build, make_build
+from charnerf.capture.procedural.build import Build, make_build
 from charnerf.capture.procedural.palette import Palette, make_palette
+from charnerf.capture.procedural.proportions import CHANCES
 from charnerf.capture.procedural.shapes import Array
 
 SURFACES = ("human", "creature", "fur", "robot", "skeleton")
@@ -15,7 +16,8 @@ SURFACES = ("human", "creature", "fur", "robot", "skeleton")
 class Figure:
     """One character being made.
 
-    shade is the brightness at the bottom of painted ramps (1 is none); crisp tells hard, box-like parts from soft ones.
+    shade is the brightness at the bottom of painted ramps (1 is none); crisp tells hard, box-like parts from
+    soft ones; grain is the strength of cloth's blotches.
     """
 
     rng: np.random.Generator

@@ -265,10 +265,17 @@ def _bald(figure: Figure, head: Head) -> Hair:
 
 
 STYLES: dict[str, tuple[Callable[[Figure, Head], Hair], float, float]] = {
-    "short": (_short, 0.30, 0.12), "bob": (_bob, 0.05, 0.20), "long": (_long, 0.07, 0.28), "spiky": (_spiky, 0.12, 0.05),
-    "tied": (_tied, 0.05, 0.24), "mohawk": (_mohawk, 0.06, 0.02), "afro": (_afro, 0.05, 0.04), "block": (_block, 0.10, 0.01),
-    "locks": (_locks, 0.04, 0.03), "bald": (_bald, 0.16, 0.01),
-}  # fmt: skip
+    "short": (_short, 0.30, 0.12),
+    "bob": (_bob, 0.05, 0.20),
+    "long": (_long, 0.07, 0.28),
+    "spiky": (_spiky, 0.12, 0.05),
+    "tied": (_tied, 0.05, 0.24),
+    "mohawk": (_mohawk, 0.06, 0.02),
+    "afro": (_afro, 0.05, 0.04),
+    "block": (_block, 0.10, 0.01),
+    "locks": (_locks, 0.04, 0.03),
+    "bald": (_bald, 0.16, 0.01),
+}
 
 
 def make_hair(figure: Figure, head: Head) -> Hair:

@@ -1,4 +1,4 @@
-"""Hats, helmets, hoods and other things worn on heads."""
+"""Hats, crowns, hoods and headbands."""
 
 from collections.abc import Callable
 
@@ -6,53 +6,34 @@ import numpy as np
 
 from charnerf.capture.procedural.figure import Figure
 from charnerf.capture.procedural.head import Head
+from charnerf.capture.procedural.headwear import brim_seat, painted_cloth, turned
+from charnerf.capture.procedural.helmets import make_great_helm, make_halo, make_headphones, make_helmet
 from charnerf.capture.procedural.parts import Part, flat
-from charnerf.capture.procedural.shapes import UP, Array, Shape, ball, box, lathe, loft, slab, tube
-from charnerf.capture.procedural.textures import Canvas, add_pattern, darker
-
-
-def _brim_seat(figure: Figure, head: Head, level: float) -> tuple[Array, float, float]:
-    """Centre (3,) of a hat's rim, its half width and half depth, m: wide enough to go round the head."""
-    centre, _ = head.ring(figure, level)
-    around = [head.ring(figure, other)[1] for other in np.linspace(level, 0.92, 4)]
-    half = np.max(around, axis=0)
-    return centre, 1.1 * float(half[0]) + 0.01, 1.1 * float(half[1]) + 0.01
-
-
-def _turned(figure: Figure, head: Head, level: float, profile: list[tuple[float, float]]) -> Shape:
-    """A lathe around the head: profile of (radius in rims, height in head heights)."""
-    centre, wide, deep = _brim_seat(figure, head, level)
-    line = np.array(profile) * np.array((wide, figure.build.head))
-    return lathe(
-        centre,
-        line,
-        depth=deep / wide,
-        sides=head.sides if head.sides != 4 else 8,
-        power=min(head.power, 4.0),
-    )
-
-
-def _painted(figure: Figure, name: str, shape: Shape, colour: Array) -> Part:
-    canvas = Canvas(2.0 * np.pi * figure.build.head_width, figure.build.head, colour)
-    if figure.chance(0.4):
-        add_pattern(canvas, figure.rng, figure.palette.second)
-    canvas.shade(1.0, figure.shade)
-    return Part(name, shape, canvas.image())
+from charnerf.capture.procedural.shapes import (
+    UP,
+    ball,
+    lathe,
+    loft,
+    slab,
+)
+from charnerf.capture.procedural.textures import (
+    darker,
+)
 
 
 def _wizard(figure: Figure, head: Head) -> list[Part]:
     level, brim, tall = figure.between(0.66, 0.8), figure.between(1.4, 2.1), figure.between(0.5, 1.1)
-    centre, wide, deep = _brim_seat(figure, head, level)
+    centre, wide, deep = brim_seat(figure, head, level)
     bend = np.array((figure.between(-0.3, 0.3), figure.between(-0.1, 0.7), 0.0)) * tall * figure.build.head
     steps = np.array((0.0, 0.3, 0.6, 0.85, 1.0))
     path = centre + steps[:, None] * tall * figure.build.head * UP + (steps**2)[:, None] * bend
     radii = np.array((1.02, 0.75, 0.45, 0.2, 0.04))[:, None] * np.array((wide, deep))
     cone = loft(path, radii, axis=UP, sides=10)
-    disc = _turned(figure, head, level, [(0.9 * brim, -0.06), (brim, -0.03), (1.0, 0.05)])
-    band = _turned(figure, head, level, [(1.06, 0.04), (1.0, 0.14)])
+    disc = turned(figure, head, level, [(0.9 * brim, -0.06), (brim, -0.03), (1.0, 0.05)])
+    band = turned(figure, head, level, [(1.06, 0.04), (1.0, 0.14)])
     colour = figure.palette.main if figure.chance(0.6) else figure.palette.second
     return [
-        _painted(figure, "hat", cone, colour),
+        painted_cloth(figure, "hat", cone, colour),
         flat("hat", disc, darker(colour, 0.85)),
         flat("hat", band, figure.palette.accent),
     ]
@@ -62,18 +43,18 @@ def _brimmed(figure: Figure, head: Head) -> list[Part]:
     """Top hats, straw hats, bowlers and the like."""
     level, brim = figure.between(0.68, 0.8), figure.between(1.2, 2.0)
     tall, flare = figure.between(0.2, 0.6), figure.between(0.7, 1.1)
-    crown = _turned(
+    crown = turned(
         figure,
         head,
         level,
         [(1.0, 0.0), (0.5 + 0.5 * flare, 0.6 * tall), (flare, tall), (0.6 * flare, 1.04 * tall)],
     )
     droop = figure.between(-0.05, 0.06)
-    disc = _turned(figure, head, level, [(brim, droop - 0.02), (brim, droop + 0.02), (0.9, 0.05)])
-    band = _turned(figure, head, level, [(1.05, 0.03), (0.5 + 0.53 * flare + 0.02, 0.13)])
+    disc = turned(figure, head, level, [(brim, droop - 0.02), (brim, droop + 0.02), (0.9, 0.05)])
+    band = turned(figure, head, level, [(1.05, 0.03), (0.5 + 0.53 * flare + 0.02, 0.13)])
     colour = figure.palette.leather if figure.chance(0.4) else figure.palette.main
     parts = [
-        _painted(figure, "hat", crown, colour),
+        painted_cloth(figure, "hat", crown, colour),
         flat("hat", disc, darker(colour, 0.9)),
         flat("hat", band, figure.palette.accent),
     ]
@@ -81,7 +62,7 @@ def _brimmed(figure: Figure, head: Head) -> list[Part]:
 
 
 def _feather(figure: Figure, head: Head) -> list[Part]:
-    centre, wide, _ = _brim_seat(figure, head, 0.8)
+    centre, wide, _ = brim_seat(figure, head, 0.8)
     side = 1.0 if figure.chance(0.5) else -1.0
     root = centre + np.array((side * wide, 0.0, 0.0))
     long = figure.build.head * figure.between(0.4, 0.8)
@@ -105,13 +86,13 @@ def _cap(figure: Figure, head: Head) -> list[Part]:
     level = figure.between(0.66, 0.76)
     colour = figure.palette.main if figure.chance(0.5) else figure.palette.accent
     tall = 1.06 - level
-    dome = _turned(
+    dome = turned(
         figure, head, level, [(1.0, 0.0), (1.02, 0.4 * tall), (0.85, 0.8 * tall), (0.45, 1.08 * tall)]
     )
-    parts = [_painted(figure, "hat", dome, colour)]
+    parts = [painted_cloth(figure, "hat", dome, colour)]
     if figure.chance(0.35):
         parts.append(
-            flat("hat", _turned(figure, head, level, [(1.08, -0.03), (1.08, 0.09)]), figure.palette.second)
+            flat("hat", turned(figure, head, level, [(1.08, -0.03), (1.08, 0.09)]), figure.palette.second)
         )
         if figure.chance(0.6):
             top = figure.build.head_centre + 0.6 * figure.build.head * UP
@@ -121,7 +102,7 @@ def _cap(figure: Figure, head: Head) -> list[Part]:
                 )
             )
         return parts
-    centre, wide, deep = _brim_seat(figure, head, level)
+    centre, wide, deep = brim_seat(figure, head, level)
     ahead = -1.0 if figure.chance(0.8) else 1.0
     reach = figure.between(0.4, 0.9)
     middle = centre + np.array((0.0, ahead * deep * (1.0 + 0.35 * reach), 0.02))
@@ -135,125 +116,11 @@ def _cap(figure: Figure, head: Head) -> list[Part]:
     return parts
 
 
-def _helmet(figure: Figure, head: Head) -> list[Part]:
-    """A metal dome, open or with cheek guards, with horns, a crest or a spike."""
-    level, metal = figure.between(0.5, 0.72), figure.palette.metal
-    tall = 1.08 - level
-    dome = _turned(
-        figure, head, level, [(1.04, 0.0), (1.05, 0.35 * tall), (0.9, 0.75 * tall), (0.4, 1.05 * tall)]
-    )
-    parts = [
-        flat("helmet", dome, metal),
-        flat("helmet", _turned(figure, head, level, [(1.1, -0.03), (1.1, 0.07)]), darker(metal, 0.7)),
-    ]
-    build = figure.build
-    centre, wide, deep = _brim_seat(figure, head, level)
-    if figure.chance(0.4):
-        guard = box((0.0, 0.0, 0.0), (0.1 * wide, 0.06 * deep, 0.2 * build.head))
-        parts.append(
-            flat(
-                "helmet",
-                guard.moved(np.eye(3), centre + np.array((0.0, -1.0 * deep, -0.12 * build.head))),
-                darker(metal, 0.8),
-            )
-        )
-    if figure.chance(0.5):
-        for side in (-1.0, 1.0):
-            cheek = box(
-                centre + np.array((side * 0.98 * wide, -0.15 * deep, -0.2 * build.head)),
-                (0.06 * wide, 0.4 * deep, 0.2 * build.head),
-            )
-            parts.append(flat("helmet", cheek, metal))
-    top = build.head_centre + 0.54 * build.head * UP
-    kind = figure.choose("crest", "spike", "horns", "plain", "horns")
-    if kind == "crest":
-        angle = np.deg2rad(np.linspace(-70.0, 100.0, 8))
-        arc = np.stack((np.zeros(8), deep * np.sin(angle), 0.5 * build.head * np.cos(angle)), axis=-1) * 1.1
-        radii = np.stack(
-            (np.full(8, 0.1 * wide), np.full(8, build.head * figure.between(0.1, 0.18))), axis=-1
-        )
-        parts.append(
-            flat(
-                "helmet",
-                loft(build.head_centre + arc, radii, front=(0.0, -0.4, 1.0), sides=4),
-                figure.palette.accent,
-            )
-        )
-    elif kind == "spike":
-        parts.append(
-            flat(
-                "helmet",
-                lathe(top, [(0.12 * wide, -0.03), (0.1 * wide, 0.05), (0.01, 0.3 * build.head)], sides=6),
-                darker(metal, 1.1),
-            )
-        )
-    elif kind == "horns":
-        for side in (-1.0, 1.0):
-            root = centre + np.array((side * 0.9 * wide, 0.0, 0.2 * build.head))
-            path = root + build.head * np.array(
-                ((0.0, 0.0, 0.0), (side * 0.28, 0.0, 0.06), (side * 0.38, -0.05, 0.3))
-            )
-            parts.append(
-                flat(
-                    "helmet",
-                    loft(path, build.head_width * np.array((0.22, 0.16, 0.02)), sides=7),
-                    (0.9, 0.87, 0.76),
-                )
-            )
-    return parts
-
-
-def _great_helm(figure: Figure, head: Head) -> list[Part]:
-    """A helmet over the whole head with slits, or a space helmet with a visor."""
-    build, metal = figure.build, figure.palette.metal
-    canvas = Canvas(head.face_width_m, build.head, metal)
-    dark = np.array((0.07, 0.07, 0.09))
-    if figure.chance(0.5):
-        canvas.band(0.0, 0.1, figure.palette.accent)
-        canvas.rectangle(0.5, 0.55, 0.85 * build.head_width, 0.09 * build.head_width, dark)
-        canvas.strip(0.5, 0.012, dark if figure.chance(0.5) else figure.palette.accent, low=0.1, high=0.9)
-        for side in (-1.0, 1.0):
-            for row in (0.2, 0.28, 0.36):
-                canvas.ellipse(0.5 + 0.07 * side, row, 0.06 * build.head_width, 0.06 * build.head_width, dark)
-    else:
-        canvas.rgb[:] = figure.palette.main if figure.chance(0.5) else (0.92, 0.92, 0.93)
-        canvas.ellipse(
-            0.5,
-            0.5,
-            0.85 * build.head_width,
-            0.3 * build.head,
-            figure.palette.accent if figure.chance(0.5) else dark,
-        )
-        canvas.ellipse(0.44, 0.6, 0.16 * build.head_width, 0.06 * build.head, (0.95, 0.95, 0.98))
-    levels = np.array((-0.04, 0.0, 0.3, 0.6, 0.85, 0.98, 1.06))
-    size = np.array((1.1, 1.12, 1.12, 1.12, 1.12, 1.12, 0.7))
-    shape = head.shell(figure, levels, size, size, size, floor=0.35)
-    parts = [Part("helmet", shape, canvas.image())]
-    if figure.chance(0.35):
-        parts += _plume(figure)
-    return parts
-
-
-def _plume(figure: Figure) -> list[Part]:
-    build = figure.build
-    top = build.head_centre + 0.53 * build.head * UP
-    path = top + build.head * np.array(
-        ((0.0, 0.0, -0.03), (0.0, 0.08, 0.2), (0.0, 0.4, 0.25), (0.0, 0.62, -0.02))
-    )
-    return [
-        flat(
-            "helmet",
-            tube(path, build.head_width * np.array((0.12, 0.24, 0.26, 0.1)), front=(1.0, 0.0, 0.0)),
-            figure.palette.accent,
-        )
-    ]
-
-
 def _crown(figure: Figure, head: Head) -> list[Part]:
     level = figure.between(0.72, 0.84)
     gold = figure.palette.accent if figure.chance(0.3) else np.array((0.9, 0.72, 0.25))
-    centre, wide, deep = _brim_seat(figure, head, level)
-    parts = [flat("crown", _turned(figure, head, level, [(1.03, 0.0), (1.08, 0.12)]), gold)]
+    centre, wide, deep = brim_seat(figure, head, level)
+    parts = [flat("crown", turned(figure, head, level, [(1.03, 0.0), (1.08, 0.12)]), gold)]
     count, tall = int(figure.rng.integers(5, 10)), figure.build.head * figure.between(0.08, 0.25)
     for angle in np.arange(count) * 2.0 * np.pi / count:
         root = centre + np.array((np.sin(angle) * wide, -np.cos(angle) * deep, 0.1 * figure.build.head))
@@ -275,7 +142,7 @@ def _hood(figure: Figure, head: Head) -> list[Part]:
     shape = head.shell(
         figure, levels, sides, fronts, 1.0 + thick * np.array((1.6, 1.2, 1.3, 1.6, 1.6, 1.5, 2.0))
     )
-    parts = [_painted(figure, "hood", shape, colour)]
+    parts = [painted_cloth(figure, "hood", shape, colour)]
     if figure.chance(0.5):
         tail = figure.build.head_centre + np.array((0.0, figure.build.head_depth, 0.35 * figure.build.head))
         path = tail + figure.build.head * np.array(((0.0, -0.2, 0.0), (0.0, 0.15, 0.05), (0.0, 0.4, -0.15)))
@@ -292,7 +159,7 @@ def _hood(figure: Figure, head: Head) -> list[Part]:
 def _pirate(figure: Figure, head: Head) -> list[Part]:
     """A bicorne: a wide plate across the crown."""
     level = figure.between(0.7, 0.8)
-    centre, wide, deep = _brim_seat(figure, head, level)
+    centre, wide, deep = brim_seat(figure, head, level)
     build, colour = figure.build, darker(figure.palette.leather, 0.7)
     angle = np.linspace(0.0, np.pi, 9)
     arc = np.stack((1.45 * wide * np.cos(angle), 0.42 * build.head * np.sin(angle) ** 0.8 - 0.02), axis=-1)
@@ -305,9 +172,7 @@ def _pirate(figure: Figure, head: Head) -> list[Part]:
             flat("hat", plate.moved(tilt, centre + np.array((0.0, ahead * 1.0 * deep, 0.02))), colour)
         )
     parts.append(
-        flat(
-            "hat", _turned(figure, head, level, [(1.03, 0.0), (1.0, 0.18), (0.6, 0.34)]), darker(colour, 0.8)
-        )
+        flat("hat", turned(figure, head, level, [(1.03, 0.0), (1.0, 0.18), (0.6, 0.34)]), darker(colour, 0.8))
     )
     badge = centre + np.array((0.0, -1.08 * deep + 0.07 * build.head, 0.2 * build.head))
     parts.append(
@@ -323,9 +188,9 @@ def _pirate(figure: Figure, head: Head) -> list[Part]:
 def _band(figure: Figure, head: Head) -> list[Part]:
     """A headband, with feathers, knot, goggles or a lamp."""
     level = figure.between(0.66, 0.8)
-    centre, wide, deep = _brim_seat(figure, head, level)
+    centre, wide, deep = brim_seat(figure, head, level)
     build, colour = figure.build, figure.palette.accent
-    parts = [flat("headband", _turned(figure, head, level, [(0.99, 0.0), (1.0, 0.1)]), colour)]
+    parts = [flat("headband", turned(figure, head, level, [(0.99, 0.0), (1.0, 0.1)]), colour)]
     kind = figure.choose("knot", "goggles", "feathers", "plain")
     if kind == "knot":
         for lean in (-0.3, 0.4):
@@ -374,40 +239,22 @@ def _band(figure: Figure, head: Head) -> list[Part]:
     return parts
 
 
-def _headphones(figure: Figure, head: Head) -> list[Part]:
-    build = figure.build
-    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)
-    arc = np.stack(
-        (np.sin(angle) * 1.12 * build.head_width, np.zeros(9), 0.56 * build.head * np.cos(angle)), axis=-1
-    )
-    parts = [
-        flat(
-            "headphones",
-            loft(build.head_centre + arc, np.full(9, 0.08 * build.head_width), sides=6),
-            figure.palette.metal,
-        )
-    ]
-    for side in (-1.0, 1.0):
-        path = build.head_centre + np.outer((0.92, 1.2), (side * build.head_width, 0.0, 0.0))
-        parts.append(
-            flat("headphones", loft(path, np.full(2, 0.16 * build.head), sides=10), figure.palette.accent)
-        )
-    return parts
-
-
-def _halo(figure: Figure, head: Head) -> list[Part]:
-    build = figure.build
-    top = build.head_centre + 0.62 * build.head * UP
-    ring = lathe(top, [(0.9 * build.head_width, 0.0), (0.95 * build.head_width, 0.04 * build.head)], sides=14)
-    stem = tube(np.stack((build.head_centre, top)), np.full(2, 0.03 * build.head_width), sides=5)
-    return [flat("halo", ring, (0.95, 0.85, 0.4)), flat("halo", stem, (0.95, 0.85, 0.4))]
-
-
 HATS: tuple[tuple[Callable[[Figure, Head], list[Part]], float], ...] = (
-    (_wizard, 0.14), (_brimmed, 0.15), (_cap, 0.16), (_helmet, 0.17), (_great_helm, 0.09), (_crown, 0.07), (_hood, 0.10),
-    (_pirate, 0.06), (_band, 0.12), (_headphones, 0.04), (_halo, 0.02),
-)  # fmt: skip
-COVERING = (_wizard, _brimmed, _cap, _helmet, _great_helm, _hood, _pirate)
+    (_wizard, 0.14),
+    (_brimmed, 0.15),
+    (_cap, 0.16),
+    (make_helmet, 0.17),
+    (make_great_helm, 0.09),
+    (_crown, 0.07),
+    (_hood, 0.10),
+    (_pirate, 0.06),
+    (_band, 0.12),
+    (make_headphones, 0.04),
+    (make_halo, 0.02),
+)
+
+
+COVERING = (_wizard, _brimmed, _cap, make_helmet, make_great_helm, _hood, _pirate)
 
 
 def make_hat(figure: Figure, head: Head) -> tuple[list[Part], bool]:

@@ -38,62 +38,68 @@ def _finish(figure: Figure, canvas: Canvas) -> None:
     canvas.shade(1.0, figure.shade)
 
 
-def _front_of_trunk(figure: Figure, canvas: Canvas, top: Colour) -> None:
-    """Buttons, zips, open jackets, ties, sashes, pockets, emblems."""
-    palette = figure.palette
-    kind = figure.choose(
-        "plain", "emblem", "buttons", "jacket", "jacket", "tie", "zip", "sash", "bib", "emblem", "pockets"
-    )
-    if kind == "emblem":
-        half = figure.build.waist * figure.between(0.25, 0.6)
-        add_emblem(
-            canvas,
-            0.5,
-            figure.between(0.6, 0.74),
-            half,
-            int(figure.rng.integers(NUM_EMBLEMS)),
-            palette.accent,
-        )
-    elif kind == "buttons":
-        canvas.strip(0.5, 0.006, darker(top, 0.75))
-        for level in np.linspace(0.3, 0.88, int(figure.rng.integers(3, 6))):
-            canvas.ellipse(0.5, level, 0.016, 0.016, palette.accent)
-    elif kind == "jacket":
-        inner = palette.second if figure.chance(0.6) else WHITE
-        opening = figure.between(0.03, 0.1)
-        canvas.paint(
-            np.abs(canvas.u - 0.5) < opening * (0.35 + 0.9 * np.clip(canvas.v - 0.1, 0.0, 1.0)), inner
-        )
-        if figure.chance(0.5):
-            edge = np.abs(np.abs(canvas.u - 0.5) - opening * (0.35 + 0.9 * np.clip(canvas.v - 0.1, 0.0, 1.0)))
-            canvas.paint(
-                (edge < 0.014) & (canvas.v > 0.45 * figure.chance(0.5)),
-                darker(top, figure.between(0.5, 1.35)),
-            )
-        if figure.chance(0.3):
-            canvas.strip(0.5, 0.012, palette.accent, low=0.3, high=0.95)
-    elif kind == "tie":
-        canvas.paint(np.abs(canvas.u - 0.5) < 0.09 * np.clip(canvas.v - 0.5, 0.0, 1.0) * 2.0, WHITE)
-        canvas.strip(0.5, 0.014, palette.accent, low=0.45, high=0.96)
-    elif kind == "zip":
-        canvas.strip(0.5, 0.008, palette.metal, low=0.2)
-        canvas.band(0.9, 1.0, palette.second)
-    elif kind == "sash":
-        slope = 1.0 if figure.chance(0.5) else -1.0
-        x, y = canvas.local(0.5, 0.6)
-        wide = figure.between(0.03, 0.07)
-        near = np.abs(y - slope * 1.1 * x) < wide
-        canvas.paint(near & (np.abs(canvas.u - 0.5) < 0.25), palette.accent)
-        x, y = canvas.local(0.0, 0.6)
-        canvas.paint((np.abs(y + slope * 1.1 * x) < wide) & (np.abs(canvas.u - 0.5) > 0.25), palette.accent)
-    elif kind == "bib":
-        canvas.paint((np.abs(canvas.u - 0.5) < 0.12) & (canvas.v < 0.72), palette.trousers)
-        for u in (0.39, 0.61):
-            canvas.strip(u, 0.02, palette.trousers, low=0.5)
-            canvas.ellipse(u, 0.7, 0.02, 0.02, palette.accent)
-    else:
-        for side in (-1.0, 1.0) if figure.chance(0.6) else (1.0,):
-            canvas.rectangle(0.5 + side * 0.09, 0.68, 0.05, 0.04, darker(top, 0.8))
+def _emblem(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    half = figure.build.waist * figure.between(0.25, 0.6)
+    at = (0.5, figure.between(0.6, 0.74))
+    add_emblem(canvas, at, half, int(figure.rng.integers(NUM_EMBLEMS)), figure.palette.accent)
+
+
+def _buttons(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    canvas.strip(0.5, 0.006, darker(top, 0.75))
+    for level in np.linspace(0.3, 0.88, int(figure.rng.integers(3, 6))):
+        canvas.ellipse(0.5, level, 0.016, 0.016, figure.palette.accent)
+
+
+def _jacket(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    """An open jacket: wider towards the neck, at times with lapels and a tie."""
+    inner = figure.palette.second if figure.chance(0.6) else WHITE
+    opening = figure.between(0.03, 0.1) * (0.35 + 0.9 * np.clip(canvas.v - 0.1, 0.0, 1.0))
+    aside = np.abs(canvas.u - 0.5)
+    canvas.paint(aside < opening, inner)
+    if figure.chance(0.5):
+        above = canvas.v > 0.45 * figure.chance(0.5)
+        canvas.paint((np.abs(aside - opening) < 0.014) & above, darker(top, figure.between(0.5, 1.35)))
+    if figure.chance(0.3):
+        canvas.strip(0.5, 0.012, figure.palette.accent, low=0.3, high=0.95)
+
+
+def _tie(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    canvas.paint(np.abs(canvas.u - 0.5) < 0.09 * np.clip(canvas.v - 0.5, 0.0, 1.0) * 2.0, WHITE)
+    canvas.strip(0.5, 0.014, figure.palette.accent, low=0.45, high=0.96)
+
+
+def _zip(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    canvas.strip(0.5, 0.008, figure.palette.metal, low=0.2)
+    canvas.band(0.9, 1.0, figure.palette.second)
+
+
+def _sash(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    """A sash from a shoulder to the other hip, around the back too."""
+    slope = 1.0 if figure.chance(0.5) else -1.0
+    wide = figure.between(0.03, 0.07)
+    ahead = np.abs(canvas.u - 0.5)
+    x, y = canvas.local(0.5, 0.6)
+    canvas.paint((np.abs(y - slope * 1.1 * x) < wide) & (ahead < 0.25), figure.palette.accent)
+    x, y = canvas.local(0.0, 0.6)
+    canvas.paint((np.abs(y + slope * 1.1 * x) < wide) & (ahead > 0.25), figure.palette.accent)
+
+
+def _bib(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    """Dungarees."""
+    canvas.paint((np.abs(canvas.u - 0.5) < 0.12) & (canvas.v < 0.72), figure.palette.trousers)
+    for u in (0.39, 0.61):
+        canvas.strip(u, 0.02, figure.palette.trousers, low=0.5)
+        canvas.ellipse(u, 0.7, 0.02, 0.02, figure.palette.accent)
+
+
+def _pockets(figure: Figure, canvas: Canvas, top: Colour) -> None:
+    for side in (-1.0, 1.0) if figure.chance(0.6) else (1.0,):
+        canvas.rectangle(0.5 + side * 0.09, 0.68, 0.05, 0.04, darker(top, 0.8))
+
+
+FRONTS = (
+    _pockets, _emblem, _buttons, _jacket, _jacket, _tie, _zip, _sash, _bib, _emblem, _pockets,
+)  # fmt: skip
 
 
 def _back_of_trunk(figure: Figure, canvas: Canvas, top: Colour) -> None:
@@ -103,7 +109,7 @@ def _back_of_trunk(figure: Figure, canvas: Canvas, top: Colour) -> None:
     behind = np.abs(canvas.u - 0.5) > 0.27
     if kind == "emblem":
         half = figure.build.waist * figure.between(0.4, 0.75)
-        add_emblem(canvas, 0.0, 0.6, half, int(figure.rng.integers(NUM_EMBLEMS)), palette.accent)
+        add_emblem(canvas, (0.0, 0.6), half, int(figure.rng.integers(NUM_EMBLEMS)), palette.accent)
     elif kind == "stripe":
         canvas.strip(0.0, figure.between(0.015, 0.06), palette.second, low=0.2)
     elif kind == "straps":
@@ -136,8 +142,7 @@ def _skin_trunk(figure: Figure, canvas: Canvas) -> None:
     if figure.chance(0.3):
         add_emblem(
             canvas,
-            0.42 if figure.chance(0.5) else 0.58,
-            0.7,
+            (0.42 if figure.chance(0.5) else 0.58, 0.7),
             0.08,
             int(figure.rng.integers(NUM_EMBLEMS)),
             dark,
@@ -174,7 +179,7 @@ def _paint_trunk(figure: Figure, top: Colour, bare: bool) -> Canvas:
         if figure.chance(0.36):
             add_pattern(canvas, figure.rng, palette.second if figure.chance(0.6) else darker(top, 0.75))
         _back_of_trunk(figure, canvas, top)
-        _front_of_trunk(figure, canvas, top)
+        FRONTS[int(figure.rng.integers(len(FRONTS)))](figure, canvas, top)
         if figure.chance(0.6):
             depth = figure.between(0.04, 0.14) * canvas.height_m
             canvas.ellipse(0.5, 1.0, 0.4 * figure.build.waist, depth, palette.skin)

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from charnerf.capture.procedural.shapes import Shape
-from charnerf.capture.procedural.textures import Colour
 
 Texels = NDArray[np.uint8]
 BORDER = 2  # texels repeated around every texture, so that neighbours never bleed into each other
@@ -24,7 +23,7 @@ class Part:
     texels: Texels
 
 
-def flat(name: str, shape: Shape, colour: Colour) -> Part:
+def flat(name: str, shape: Shape, colour: ArrayLike) -> Part:
     """A part of one sRGB colour."""
     texel = (np.clip(np.asarray(colour, dtype=np.float64), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     return Part(name, shape, texel.reshape(1, 1, 3))
@@ -90,7 +89,7 @@ def _split_seams(shape: Shape, uv: NDArray[np.float64]) -> tuple[NDArray, NDArra
 
 
 def assemble(parts: list[Part]) -> trimesh.Scene:
-    """One scene: parts of one name become one geometry; all share one material with one base-colour texture."""
+    """One scene: parts of one name become one geometry; all share one material and its texture."""
     paints: dict[bytes, int] = {}
     images: list[Texels] = []
     slots = []

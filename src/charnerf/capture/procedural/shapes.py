@@ -1,7 +1,8 @@
 """Closed shapes that characters are made of: lofts, sheets, slabs.
 
-World frame: metres, +Z up, the character faces -Y, its left is +X. A texture's u runs around a shape (0.5 is the front, the
-seam is at the back, u grows towards the picture's right for someone looking at the front), v from the path's start to its end.
+World frame: metres, +Z up, the character faces -Y, its left is +X. A texture's u runs around a shape: 0.5 is
+the front, the seam is at the back, and u grows towards the picture's right for someone looking at the front;
+v runs from the path's start to its end.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ UP = np.array((0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Shape:
-    """A closed surface: vertices (n, 3) m, faces (f, 3) turned outwards, texture coordinates of face corners (f, 3, 2)."""
+    """A closed surface: vertices (n, 3) m, faces (f, 3) turned outwards, uv of face corners (f, 3, 2)."""
 
     vertices: Array
     faces: NDArray[np.int64]
@@ -51,14 +52,14 @@ def rotation(axis: ArrayLike, angle_deg: float) -> Array:
 
 
 def around(sides: int) -> Array:
-    """Where a cross-section's corners lie on u in [0, 1): 4 sides give a box whose front face is u in [0.375, 0.625]."""
+    """U in [0, 1) of a cross-section's corners: 4 sides give a box whose front is u in [0.375, 0.625]."""
     if sides == 4:
         return np.array((0.0, 0.125, 0.375, 0.625, 0.875))
     return np.arange(sides) / sides
 
 
 def cross_section(u: Array, power: float, sides: int) -> Array:
-    """Points (len(u), 2) (sideways, forwards) of a superellipse: power 2 is an ellipse, large powers are boxes."""
+    """Points (len(u), 2), sideways and forwards, of a superellipse: power 2 an ellipse, large a box."""
     angle = 2.0 * np.pi * (u - 0.5)
     wave = np.stack((np.sin(angle), np.cos(angle)), axis=-1)
     wave[np.abs(wave) < 1e-12] = 0.0
@@ -128,8 +129,8 @@ def _skin(rings: Array, u: Array, v: Array, tips: Array) -> Shape:
     """Faces of rings (k, n, 3) with fans to the two tips (2, 3)."""
     count, width = rings.shape[:2]
     u_edges = np.append(u, 1.0)
-    level, column = np.meshgrid(np.arange(count - 1), np.arange(width), indexing="ij")
-    level, column = level.ravel(), column.ravel()
+    level = np.repeat(np.arange(count - 1), width)
+    column = np.tile(np.arange(width), count - 1)
     following = (column + 1) % width
     corner = level * width
     a, b, c, d = corner + column, corner + following, corner + width + following, corner + width + column
@@ -205,9 +206,9 @@ def tube(
 def lathe(
     centre: ArrayLike, profile: ArrayLike, *, depth: float = 1.0, sides: int = 12, power: float = 2.0
 ) -> Shape:
-    """A solid of revolution about the vertical: profile (k, 2) of radius and height over the centre, m, from its start to its end.
+    """A solid of revolution about the vertical: profile (k, 2) of radius and height over the centre, m.
 
-    The profile runs outside from bottom to top; depth scales the radius forwards.
+    The profile runs from bottom to top; depth scales the radius forwards.
     """
     line = np.asarray(profile, dtype=np.float64)
     centres = np.asarray(centre, dtype=np.float64) + np.outer(line[:, 1], UP)
@@ -246,7 +247,7 @@ def sheet(grid: ArrayLike, thickness: float) -> Shape:
 
 
 def slab(outline: ArrayLike, thickness: float) -> Shape:
-    """A plate in the plane y = 0: outline (k, 2) of x and z, star-shaped about its mean, anticlockwise seen from -Y, m."""
+    """A plate in the plane y = 0: outline (k, 2) of x and z, m, star-shaped, anticlockwise from -Y."""
     line = np.asarray(outline, dtype=np.float64)
     count = len(line)
     low, high = line.min(axis=0), line.max(axis=0)

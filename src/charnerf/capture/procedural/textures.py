@@ -30,7 +30,7 @@ class Canvas:
         u, v = (np.arange(columns) + 0.5) / columns, 1.0 - (np.arange(rows) + 0.5) / rows
         self.u, self.v = np.meshgrid(u, v)
 
-    def paint(self, mask: NDArray[np.bool_], colour: Colour, opacity: float = 1.0) -> None:
+    def paint(self, mask: NDArray[np.bool_], colour: ArrayLike, opacity: float = 1.0) -> None:
         """Lay a colour over the texels of a mask (rows, columns)."""
         self.rgb[mask] = (1.0 - opacity) * self.rgb[mask] + opacity * np.asarray(colour)
 
@@ -51,7 +51,7 @@ class Canvas:
             (np.abs((self.u - u + 0.5) % 1.0 - 0.5) < half_width) & (self.v >= low) & (self.v < high), colour
         )
 
-    def ellipse(self, u: float, v: float, right: float, up: float, colour: Colour) -> None:
+    def ellipse(self, u: float, v: float, right: float, up: float, colour: ArrayLike) -> None:
         """An ellipse with half sizes in metres."""
         x, y = self.local(u, v)
         self.paint((x / right) ** 2 + (y / up) ** 2 < 1.0, colour)
@@ -162,8 +162,18 @@ def _panels(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
 
 
 PATTERNS = (
-    _stripes, _pinstripes, _diagonal, _checks, _plaid, _dots, _blotches, _zigzag, _halves, _fade, _panels,
-)  # fmt: skip
+    _stripes,
+    _pinstripes,
+    _diagonal,
+    _checks,
+    _plaid,
+    _dots,
+    _blotches,
+    _zigzag,
+    _halves,
+    _fade,
+    _panels,
+)
 
 
 def add_pattern(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
@@ -194,7 +204,7 @@ def emblem_mask(x: Array, y: Array, kind: int) -> NDArray[np.bool_]:
 NUM_EMBLEMS = 12
 
 
-def add_emblem(canvas: Canvas, u: float, v: float, half_m: float, kind: int, colour: Colour) -> None:
-    """Paint an emblem about a point."""
-    x, y = canvas.local(u, v)
+def add_emblem(canvas: Canvas, at: tuple[float, float], half_m: float, kind: int, colour: Colour) -> None:
+    """Paint an emblem about a point (u, v)."""
+    x, y = canvas.local(*at)
     canvas.paint(emblem_mask(x / half_m, y / half_m, kind), colour)

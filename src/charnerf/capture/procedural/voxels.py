@@ -1,7 +1,7 @@
 """Characters made of coarse cubes, as voxel editors draw them."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from charnerf.capture.procedural.palette import BLACK, WHITE, Palette, make_palette
 from charnerf.capture.procedural.parts import Part, flat
@@ -25,7 +25,7 @@ class Voxels:
         self._colours: list[Colour] = []
         self._blocks: dict[str, tuple[Block, tuple[int, int, int]]] = {}
 
-    def colour(self, value: Colour) -> int:
+    def colour(self, value: ArrayLike) -> int:
         """Number of a colour."""
         self._colours.append(np.asarray(value, dtype=np.float64))
         return len(self._colours)
@@ -51,7 +51,7 @@ class Voxels:
 
 
 def _boxes(block: Block) -> list[tuple[NDArray[np.int64], NDArray[np.int64], int]]:
-    """Cover the cubes of a block by boxes of one colour each: low and high corners and the colour's number."""
+    """Cover the cubes of a block by boxes of one colour each: low and high corners, colour number."""
     left = block.copy()
     found = []
     for x, y, z in np.argwhere(block > 0):
