@@ -15,7 +15,17 @@ LAYERS = (
     ("errors", "checks", "types", "schedule", "config"),
     ("geometry",),
     ("models", "volume", "data", "losses"),
-    ("capture", "drawings", "evaluation", "meshing", "model_api", "reconstruction", "runs", "stability", "training"),
+    (
+        "capture",
+        "drawings",
+        "evaluation",
+        "meshing",
+        "model_api",
+        "reconstruction",
+        "runs",
+        "stability",
+        "training",
+    ),
     ("cli", "commands", "__main__", "__init__"),
 )
 LAYER_OF = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
@@ -36,6 +46,16 @@ ONLY_IN = {  # foreign package: where it may be imported
     "omegaconf": ("config", "runs", "commands", "training/run", "training/finish"),
     "lightning": ("training", "data/datamodule"),
     "typer": ("cli",),
+}
+
+GLOBAL_SETTERS = {
+    "seed",
+    "manual_seed",
+    "seed_everything",
+    "set_num_threads",
+    "set_default_dtype",
+    "use",
+    "mallopt",
 }
 
 
@@ -102,6 +122,18 @@ def test_no_drawer_for_leftovers() -> None:
 def test_files_stay_short(file: Path) -> None:
     count = len(file.read_text(encoding="utf-8").splitlines())
     assert count <= MAX_LINES, f"{file}: {count} lines, expected at most {MAX_LINES}; split it by idea"
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_importing_changes_no_global_state(file: Path) -> None:
+    """No module seeds, sets threads or flags when it is imported."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    for statement in tree.body:
+        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            continue
+        for node in ast.walk(statement):
+            called = getattr(getattr(node, "func", None), "attr", "")
+            assert called not in GLOBAL_SETTERS, f"{file}:{node.lineno}: {called} at import"  # type: ignore[attr-defined]
 
 
 def test_the_rules_bite(tmp_path: Path) -> None:

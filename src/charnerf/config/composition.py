@@ -19,7 +19,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from charnerf.config.hints import nearest
-from charnerf.config.validation import validate
+from charnerf.config.validation import check_files, validate
 from charnerf.errors import CharNeRFError, ConfigError
 
 FAILED, WRONG_CALL = 1, 2
@@ -73,7 +73,9 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
         broken: list[tuple[list[str], ConfigError]] = []
         for job in jobs:
             try:
-                validate(_compose(name, more + job), trusted_targets=trusted_by(job))
+                cfg = _compose(name, more + job)
+                validate(cfg, trusted_targets=trusted_by(job))
+                check_files(cfg)
             except ConfigError as error:
                 broken.append((job, error))
     if not broken:
@@ -105,22 +107,20 @@ def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: 
     try:
         check_command_line(arguments, conf=conf)
         function()
-    except (CharNeRFError, HydraException, OmegaConfBaseException, OSError, MemoryError) as error:
-        if debug:
-            traceback.print_exc()
-        sys.stderr.write(f"error: {error}\n")
-        return (
-            FAILED if isinstance(error, CharNeRFError | OSError) and not is_wrong_call(error) else WRONG_CALL
-        )
     except KeyboardInterrupt:
         sys.stderr.write("stopped.\n")
         return FAILED
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        is_ours = isinstance(error, CharNeRFError | HydraException | OmegaConfBaseException | OSError)
+        kind = "" if is_ours else f"{type(error).__name__}: "
+        hint = "" if is_ours or debug else " (HYDRA_FULL_ERROR=1 shows where)"
+        sys.stderr.write(f"error: {kind}{error}{hint}\n")
+        return (
+            WRONG_CALL if isinstance(error, ConfigError | HydraException | OmegaConfBaseException) else FAILED
+        )
     return 0
-
-
-def is_wrong_call(error: BaseException) -> bool:
-    """Whether an error is about what was typed."""
-    return isinstance(error, ConfigError | HydraException | OmegaConfBaseException)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import make_dataclass
+from pathlib import Path
 from typing import Any, get_type_hints
 
 from omegaconf import DictConfig, ListConfig, OmegaConf
@@ -34,6 +35,28 @@ def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> N
     schema = make_dataclass("ModelConfig", [(name, hints[name]) for name in MODEL_SECTIONS], frozen=True)
     chosen = OmegaConf.masked_copy(cfg, [name for name in MODEL_SECTIONS if name in cfg])
     _validate_against(schema, chosen, trusted_targets)
+
+
+def check_files(cfg: DictConfig) -> None:
+    """Check that the data set and the checkpoint that a valid config names are there.
+
+    Raises:
+        ConfigError: Names each one that is not.
+    """
+    problems = Problems()
+    root = OmegaConf.select(cfg, "data.root")
+    if root is not None and not (Path(root) / "dataset.json").is_file():
+        problems.add(
+            "data.root",
+            f"found no dataset.json in '{root}', expected a data set; `charnerf capture` "
+            "or `charnerf generate` makes one.",
+        )
+    if cfg.ckpt_path not in (None, "last") and not Path(cfg.ckpt_path).is_file():
+        problems.add(
+            "ckpt_path", f"found '{cfg.ckpt_path}', which is no file; expected a .ckpt, `last` or null."
+        )
+    if problems.found:
+        raise ConfigError(as_message(problems.lines()))
 
 
 def _validate_against(schema: type, cfg: DictConfig, trusted_targets: Sequence[str]) -> None:

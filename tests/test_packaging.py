@@ -1,0 +1,45 @@
+"""What an installed package carries."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import charnerf
+from charnerf.config.composition import conf_folder
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def test_every_public_name_is_there_and_imported_late() -> None:
+    code = "import sys, charnerf; print('torch' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+    assert all(getattr(charnerf, name) is not None for name in charnerf.__all__)
+    with pytest.raises(AttributeError, match="nothing"):
+        charnerf.nothing  # noqa: B018
+    assert set(charnerf.__all__) <= set(dir(charnerf))
+
+
+def test_the_version_is_the_projects() -> None:
+    assert charnerf.__version__ == PROJECT["project"]["version"]
+
+
+def test_config_files_are_found_and_shipped() -> None:
+    assert (conf_folder() / "train.yaml").is_file()
+    assert PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]["conf"] == "charnerf/conf"
+
+
+def test_the_command_is_declared() -> None:
+    assert PROJECT["project"]["scripts"] == {"charnerf": "charnerf.cli:main"}
+
+
+def test_ci_runs_what_the_readme_says() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert "set -euo pipefail" in script
+    for step in ("ruff check", "ruff format --check", "mypy", "python -m pytest"):
+        assert step in script
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
