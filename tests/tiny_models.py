@@ -1,0 +1,115 @@
+"""Models small enough to test, built part by part."""
+
+import torch
+from torch import nn
+
+from charnerf.models.activations import ShiftedSoftplus
+from charnerf.models.charnerf import CharNeRF
+from charnerf.models.combinators.base import AbstractCombinator
+from charnerf.models.combinators.learned import LearnedWeights
+from charnerf.models.combinators.mean import Mean
+from charnerf.models.combinators.self_attention import SelfAttention
+from charnerf.models.combinators.view_attention import ViewAttention
+from charnerf.models.density.view_dependent import ViewDependentDensity
+from charnerf.models.density.view_free import ViewFreeDensity
+from charnerf.models.encoders.double import DoubleHourglass
+from charnerf.models.encoders.single import SingleHourglass
+from charnerf.models.features.image import ImageFeatures
+from charnerf.models.features.image_hull import ImageHullFeatures
+from charnerf.models.field import Field
+from charnerf.models.heads.blend import BlendHead
+from charnerf.models.heads.radiance import RadianceHead
+from charnerf.models.views.mirrored import MirroredSide
+from charnerf.models.views.turnaround import Turnaround
+
+WIDTH = 12
+FREQUENCIES = 3
+COMBINATORS = ("mean", "sa", "view_mha", "learned")
+
+
+def combinator(name: str, *, width: int = WIDTH) -> AbstractCombinator:
+    """A combinator by its option's name."""
+    attention = {"width": width, "num_heads": 2, "residual": False, "temperature": None}
+    made = {
+        "mean": Mean,
+        "sa": lambda: SelfAttention(**attention),
+        "view_mha": lambda: ViewAttention(**attention, view_scale=1.0),
+        "learned": lambda: LearnedWeights(width=width, hidden=8),
+    }
+    return made[name]()
+
+
+def single(*, stride: int = 2, num_stacks: int = 1) -> SingleHourglass:
+    """A tiny encoder of one hourglass."""
+    return SingleHourglass(
+        in_channels=4, num_stacks=num_stacks, depth=2, width=8, out_channels=6, stride=stride
+    )
+
+
+def double() -> DoubleHourglass:
+    """A tiny encoder of two."""
+    return DoubleHourglass(
+        in_channels=4,
+        coarse_stacks=2,
+        fine_stacks=1,
+        depth=1,
+        coarse_width=8,
+        fine_width=8,
+        coarse_channels=5,
+        fine_channels=6,
+        reduction=2,
+        stride=2,
+    )
+
+
+def tiny_model(
+    *,
+    combining: str = "learned",
+    head: str = "blend",
+    density: str = "view_free",
+    views: str = "turnaround",
+    features: str = "image_hull",
+    fine: bool = False,
+    hull: bool = True,
+) -> CharNeRF:
+    """A model of a few thousand parameters; the names are those of the config's options."""
+    encoder = single()
+    inputs = {"image": ImageFeatures, "image_hull": ImageHullFeatures}[features]()
+
+    def field() -> Field:
+        return Field(
+            combinator=combinator(combining),
+            density={"view_free": ViewFreeDensity, "view_dependent": ViewDependentDensity}[density](
+                width=WIDTH
+            ),
+            head=BlendHead(width=WIDTH, hidden=8) if head == "blend" else RadianceHead(width=WIDTH),
+            activation=ShiftedSoftplus(shift=-1.0, scale=20.0),
+            feature_channels=encoder.out_channels,
+            encoded_size=6 * FREQUENCIES,
+            num_extras=inputs.num_extras,
+            width=WIDTH,
+            num_single_view_blocks=1,
+            num_multi_view_blocks=1,
+        )
+
+    return CharNeRF(
+        encoder=encoder,
+        views={"turnaround": Turnaround, "mirrored": MirroredSide}[views](),
+        features=inputs,
+        coarse=field(),
+        fine=field() if fine else None,
+        num_frequencies=FREQUENCIES,
+        box_centre=[0.0, 0.0, 1.0],
+        box_half_extent=1.8,
+        hull=hull,
+    )
+
+
+def shake(module: nn.Module, *, seed: int = 0, scale: float = 0.3) -> nn.Module:
+    """Add noise to every parameter: layers that start at zero would hide what depends on what."""
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for parameter in module.parameters():
+            noise = torch.randn(parameter.shape, generator=generator, dtype=parameter.dtype)
+            parameter.add_(noise, alpha=scale)
+    return module
