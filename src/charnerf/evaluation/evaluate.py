@@ -179,7 +179,7 @@ def _evaluate_character(
             state.left_out += rendering.left_out
             drawn["ours"].append(to_cpu(rendering.finest, name=f"{name}, view {index}"))
             bar.update()
-        surface = None if mesh is None else _make_mesh(state, mesh, scene, sources)
+        surface = "no mesh was made" if mesh is None else _make_mesh(state, mesh, scene, sources)
     truth = None if character.mesh_file is None else surface_error.true_points(character.mesh_file)
     hull_mesh = _draw_baselines(state, drawn, character, indices)
     images = character.images(indices)

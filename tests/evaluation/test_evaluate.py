@@ -1,0 +1,156 @@
+import json
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+from figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, write_figure
+from PIL import Image
+
+from charnerf.data.characters import load_character
+from charnerf.errors import DataError, NumericalError
+from charnerf.evaluation import metrics
+from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
+from charnerf.evaluation.scores import METRIC_KEYS, on_white
+from charnerf.types import LeftOut, RenderOutput
+
+
+def make_mesh(scene, views):
+    assert views.images.shape[0] == 1
+    return SimpleNamespace(mesh=scene.hull.mesh, left_out=LeftOut(grid_cells=5, grid_cells_of=8))
+
+
+@pytest.fixture(scope="module")
+def outcome(figure_dataset, tmp_path_factory):
+    output = tmp_path_factory.mktemp("run")
+    found = evaluate(
+        HullModel(),
+        HullRenderer(),
+        figure_dataset,
+        "test",
+        views=4,
+        output=output,
+        mesh=make_mesh,
+        train_seconds=12.5,
+        progress=False,
+    )
+    return found, output
+
+
+def test_every_key_of_the_format_is_there_and_every_null_has_its_reason(outcome):
+    found, _ = outcome
+    assert (found["split"], found["num_characters"], found["num_views"]) == ("test", 2, 8)
+    assert list(found["per_character"]) == ["ball", "doll"]
+    assert list(found["baselines"]) == ["white", "visual_hull"]
+    for scores in (found, *found["per_character"].values(), *found["baselines"].values()):
+        for key in METRIC_KEYS:
+            assert (scores[key] is None) == (f"{key}_reason" in scores)
+    assert found["seconds"]["train"] == 12.5
+    assert all(found["seconds"][key] > 0.0 for key in ("encode", "render_per_frame", "mesh"))
+    assert found["left_out"] == {"rays": 0.75, "samples": 0.9, "grid_cells": 0.625}
+    assert {"device", "torch", "commit", "threads", "machine"} <= set(found["environment"])
+    assert found["peak_memory_mib"] > 50.0
+    assert len(found["by_azimuth"]) == 12
+    assert sum(row["num_views"] for row in found["by_elevation"]) == 8
+
+
+def test_a_model_that_answers_the_hull_scores_as_the_hull(outcome):
+    found, _ = outcome
+    for key in METRIC_KEYS:
+        assert found[key] == found["baselines"]["visual_hull"][key]
+    assert found["baselines"]["white"]["chamfer_mm"] is None
+    assert found["baselines"]["white"]["silhouette_iou"] == 0.0
+
+
+def test_means_are_over_the_characters(outcome):
+    found, _ = outcome
+    for key in ("psnr", "psnr_foreground", "ssim", "flip", "silhouette_iou", "chamfer_mm", "f_score"):
+        both = [found["per_character"][name][key] for name in ("ball", "doll")]
+        assert found[key] == pytest.approx(sum(both) / 2.0)
+
+
+def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):
+    """A metric can be added later: PNG bytes move PSNR by less than 0.05 dB."""
+    found, output = outcome
+    character = load_character(figure_dataset, "doll")
+    again = []
+    for index in fixed_views(character, 4):
+        kept = output / "images" / "doll" / f"{index:03d}.png"
+        prediction = on_white(torch.from_numpy(np.array(Image.open(kept))))[0]
+        again.append(metrics.psnr(prediction, on_white(character.images([index])[0])[0]))
+    assert np.mean(again) == pytest.approx(found["per_character"]["doll"]["psnr"], abs=0.05)
+    assert (output / "images" / "doll" / "sheet.png").is_file()
+
+
+def test_fixed_views_are_the_same_every_time_and_spread(figure_dataset):
+    character = load_character(figure_dataset, "ball")
+    assert fixed_views(character, 3) == [1, 3, 5]
+    assert fixed_views(character, 100) == fixed_views(character, "all") == list(range(7))
+    with pytest.raises(DataError, match="views: found 0"):
+        fixed_views(character, 0)
+
+
+def test_what_was_not_made_is_null_with_its_reason(figure_dataset):
+    found = evaluate(
+        BlindModel(), WhiteRenderer(), figure_dataset, "test", views=1, baselines=False, progress=False
+    )
+    assert found["baselines"] == {}
+    assert found["chamfer_mm_reason"] == found["seconds"]["mesh_reason"] == "no mesh was made"
+    assert found["seconds"]["train"] is None and found["seconds"]["train_reason"]
+    assert found["left_out"]["rays"] is None and found["left_out"]["rays_reason"]
+    assert found["silhouette_iou"] == 0.0
+
+
+def test_a_mesh_that_fails_is_a_reason_and_no_end(figure_dataset):
+    def fail(scene, views):
+        raise NumericalError("density: found 3 values not finite.")
+
+    found = evaluate(
+        BlindModel(),
+        WhiteRenderer(),
+        figure_dataset,
+        "test",
+        views=1,
+        mesh=fail,
+        baselines=False,
+        progress=False,
+    )
+    assert found["chamfer_mm_reason"] == "density: found 3 values not finite."
+
+
+def test_a_prediction_of_nan_names_its_picture(figure_dataset):
+    class Broken:
+        def render_camera(self, scene, camera):
+            shape = (camera.height, camera.width)
+            output = RenderOutput(torch.full((*shape, 3), math.nan), torch.zeros(shape), torch.zeros(shape))
+            return SimpleNamespace(finest=output, left_out=LeftOut())
+
+    with pytest.raises(NumericalError, match="ball, view 3: rgb"):
+        evaluate(BlindModel(), Broken(), figure_dataset, "test", views=1, progress=False)
+
+
+def test_a_data_set_without_meshes_says_so(tmp_path):
+    write_figure(tmp_path, "ball", "ball", num_views=2)
+    (tmp_path / "ball" / "mesh" / "mesh.obj").unlink()
+    found = evaluate(
+        HullModel(),
+        HullRenderer(),
+        tmp_path,
+        "test",
+        views=1,
+        mesh=make_mesh,
+        baselines=False,
+        progress=False,
+    )
+    assert found["f_score_reason"] == "the data set has no mesh of the character"
+
+
+def test_metrics_are_written_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "metrics.json"
+    write_metrics(path, {"psnr": 1.5})
+    assert json.loads(path.read_text()) == {"psnr": 1.5}
+    with pytest.raises(ValueError, match="JSON"):
+        write_metrics(path, {"psnr": math.nan})
+    assert json.loads(path.read_text()) == {"psnr": 1.5}
+    assert list(tmp_path.iterdir()) == [path]

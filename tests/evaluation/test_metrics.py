@@ -1,0 +1,137 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+from skimage.metrics import peak_signal_noise_ratio, structural_similarity
+
+from charnerf.errors import DataError, NumericalError, ShapeError
+from charnerf.evaluation import metrics
+
+PICTURE_METRICS = (metrics.psnr, metrics.ssim, metrics.flip, metrics.lpips)
+
+
+@pytest.fixture
+def pair() -> tuple[torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(3)
+    truth = torch.rand(40, 32, 3, generator=generator)
+    return (truth + 0.1 * torch.randn(40, 32, 3, generator=generator)).clamp(0.0, 1.0), truth
+
+
+def test_psnr_of_a_constant_error_by_hand():
+    truth = torch.full((4, 5, 3), 0.5)
+    assert metrics.psnr(truth + 0.1, truth) == pytest.approx(20.0, abs=1e-4)
+    assert metrics.psnr(truth + 0.01, truth) == pytest.approx(40.0, abs=1e-3)
+
+
+def test_psnr_of_equal_pictures_is_finite():
+    truth = torch.rand(4, 5, 3)
+    assert metrics.psnr(truth, truth) == pytest.approx(100.0)
+
+
+def test_psnr_and_ssim_agree_with_scikit_image(pair):
+    prediction, truth = pair
+    expected = peak_signal_noise_ratio(truth.double().numpy(), prediction.double().numpy(), data_range=1.0)
+    assert metrics.psnr(prediction, truth) == pytest.approx(expected, abs=1e-5)
+    expected = structural_similarity(
+        truth.double().numpy(),
+        prediction.double().numpy(),
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        data_range=1.0,
+        channel_axis=-1,
+    )
+    assert metrics.ssim(prediction, truth) == pytest.approx(expected, abs=1e-4)
+
+
+def test_foreground_counts_only_pixels_of_alpha_above_a_half():
+    truth, prediction = torch.ones(2, 2, 3), torch.ones(2, 2, 3)
+    alpha = torch.tensor([[1.0, 0.5], [0.0, 0.51]])
+    prediction[0, 0] = 0.9
+    prediction[0, 1] = 0.0  # alpha of a half is background
+    assert metrics.psnr_foreground(prediction, truth, alpha) == pytest.approx(
+        -10.0 * math.log10(0.005), abs=1e-4
+    )
+    assert metrics.psnr_foreground(prediction, truth, torch.zeros(2, 2)) is None
+
+
+def test_white_has_a_closed_form():
+    """White against a black square that fills a quarter: MSE 1/4, foreground MSE 1."""
+    truth, alpha = torch.ones(16, 16, 3), torch.zeros(16, 16)
+    truth[:8, :8], alpha[:8, :8] = 0.0, 1.0
+    white = torch.ones(16, 16, 3)
+    assert metrics.psnr(white, truth) == pytest.approx(10.0 * math.log10(4.0))
+    assert metrics.psnr_foreground(white, truth, alpha) == pytest.approx(0.0)
+    assert metrics.silhouette_iou(torch.zeros(16, 16), alpha) == 0.0
+
+
+def test_silhouette_iou_by_hand():
+    found, true = torch.zeros(4, 4), torch.zeros(4, 4)
+    found[:, :2], true[:, 1:3] = 0.9, 0.6
+    assert metrics.silhouette_iou(found, true) == pytest.approx(1.0 / 3.0)
+    assert metrics.silhouette_iou(torch.zeros(4, 4), torch.zeros(4, 4)) == 1.0
+
+
+def test_flip_is_zero_for_equal_pictures_and_grows_with_the_error(pair):
+    prediction, truth = pair
+    assert metrics.flip(truth, truth) == 0.0
+    small, large = metrics.flip(0.5 * (prediction + truth), truth), metrics.flip(prediction, truth)
+    assert 0.0 < small < large < 1.0
+
+
+def test_lpips_is_a_number_or_null_with_a_reason(pair):
+    value, reason = metrics.lpips(*pair)
+    assert (value is None) != (reason is None)
+    assert reason is None or "LPIPS needs" in reason
+
+
+@pytest.mark.parametrize("metric", PICTURE_METRICS)
+def test_bytes_nan_and_foreign_shapes_are_refused(metric, pair):
+    prediction, truth = pair
+    with pytest.raises(
+        DataError, match=r"prediction: found values from .* expected the range \[0, 1\]; divide"
+    ):
+        metric(prediction * 255.0, truth)
+    broken = truth.clone()
+    broken[0, 0, 0] = math.nan
+    with pytest.raises(NumericalError, match="truth: found 1 of 3840"):
+        metric(prediction, broken)
+    with pytest.raises(ShapeError, match="prediction and truth"):
+        metric(prediction[:-1], truth)
+
+
+def test_alpha_and_opacity_out_of_range_are_refused(pair):
+    with pytest.raises(DataError, match="true_alpha"):
+        metrics.psnr_foreground(*pair, torch.full((40, 32), 255.0))
+    with pytest.raises(NumericalError, match="opacity"):
+        metrics.silhouette_iou(torch.full((4, 4), math.nan), torch.zeros(4, 4))
+
+
+def ball(radius: float, count: int) -> np.ndarray:
+    directions = np.random.default_rng(0).normal(size=(count, 3))
+    return radius * directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
+def test_chamfer_and_f_score_of_two_spheres():
+    """Concentric spheres 30 mm apart: so is every point, up to the spacing of the points."""
+    inner, outer = ball(0.5, 20_000), ball(0.53, 20_000)
+    assert metrics.chamfer_mm(inner, outer) == pytest.approx(30.0, abs=1.0)
+    assert metrics.f_score(inner, outer) == 0.0
+    assert metrics.f_score(inner, outer, radius=0.04) == 1.0
+
+
+def test_chamfer_and_f_score_by_hand():
+    """One of two predicted points is 1 m off; all true points are found: precision 1/2, recall 1."""
+    true = np.zeros((1, 3))
+    predicted = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    assert metrics.chamfer_mm(predicted, true) == pytest.approx(250.0)
+    assert metrics.f_score(predicted, true) == pytest.approx(2.0 / 3.0)
+
+
+def test_points_that_are_none_or_not_finite_are_refused():
+    points = np.zeros((4, 3))
+    with pytest.raises(NumericalError, match="predicted"):
+        metrics.chamfer_mm(np.full((4, 3), np.nan), points)
+    with pytest.raises(ShapeError, match="true"):
+        metrics.f_score(points, np.zeros((0, 3)))

@@ -1,0 +1,103 @@
+import json
+import re
+
+import pytest
+from figures import HullModel, HullRenderer
+
+from charnerf.errors import DataError
+from charnerf.evaluation.evaluate import evaluate, write_metrics
+from charnerf.evaluation.plots import read_curve
+from charnerf.evaluation.report import write_folder_report, write_run_report
+
+CURVE = """step,phase,seconds,rays,val_psnr,val_psnr_foreground,val_ssim,loss/rgb
+0,0,0.0,0,12.5,5.0,0.7,nan
+100,0,10.5,51200,,,,0.02
+200,1,21.0,102400,20.25,14.5,0.85,0.01
+"""
+
+
+@pytest.fixture(scope="module")
+def run(figure_dataset, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "sweep" / "0"
+    found = evaluate(
+        HullModel(),
+        HullRenderer(),
+        figure_dataset,
+        "test",
+        views=2,
+        output=folder,
+        train_seconds=21.0,
+        progress=False,
+    )
+    write_metrics(folder / "metrics.json", found)
+    (folder / "curve.csv").write_text(CURVE)
+    (folder / "config.yaml").write_text("seed: 3 # <angle>\n")
+    (folder / ".hydra").mkdir()
+    (folder / ".hydra" / "overrides.yaml").write_text("- combinator=mean\n- seed=3\n")
+    return folder
+
+
+def test_run_report_holds_the_numbers_and_pictures(run):
+    metrics = json.loads((run / "metrics.json").read_text())
+    path = write_run_report(run)
+    text = path.read_text()
+    for value in (f"{metrics['psnr']:.2f}", f"{metrics['baselines']['white']['psnr']:.2f}", "21 s"):
+        assert value in text
+    assert "lpips" in text and "the character" not in text.split("## What could not be had")[0]
+    links = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
+    assert {"images/curve.png", "images/angles.png", "images/ball/sheet.png"} <= set(links)
+    assert all((run / link).is_file() for link in links)
+    assert text.index("| ball |") < text.index("| doll |")  # worst first
+
+
+def test_html_is_one_file_that_needs_nothing_else(run):
+    write_run_report(run)
+    page = (run / "report.html").read_text()
+    sources = re.findall(r'src="([^"]{0,30})', page)
+    assert len(sources) >= 4
+    assert all(source.startswith("data:image/") for source in sources)
+    assert "seed: 3 # &lt;angle&gt;" in page
+
+
+def test_report_without_a_curve_says_so(run, tmp_path):
+    (tmp_path / "metrics.json").write_text((run / "metrics.json").read_text())
+    assert "no validation figures over time" in write_run_report(tmp_path).read_text()
+
+
+def test_folder_report_has_one_row_a_run_and_one_diagram(run):
+    folder = run.parent
+    second = folder / "1"
+    second.mkdir(exist_ok=True)
+    metrics = json.loads((run / "metrics.json").read_text())
+    metrics["psnr_foreground"] += 1.0
+    metrics["seconds"]["train"] = None
+    write_metrics(second / "metrics.json", metrics)
+    text = write_folder_report(folder).read_text()
+    assert "2 runs" in text
+    assert "| 0 | combinator=mean seed=3 |" in text
+    assert text.index("| 1 | - |") < text.index("| 0 | combinator")  # best first
+    assert (folder / "report_curves.png").is_file()
+    assert (folder / "report.html").is_file()
+
+
+def test_curve_keeps_finite_numbers_only(run):
+    rows = read_curve(run / "curve.csv")
+    assert "loss/rgb" not in rows[0]
+    assert rows[2]["val_psnr"] == 20.25
+    assert "val_psnr" not in rows[1]
+
+
+def test_missing_and_broken_files_are_named(tmp_path):
+    with pytest.raises(DataError, match=r"metrics\.json: no such file"):
+        write_run_report(tmp_path)
+    with pytest.raises(DataError, match=r"found no metrics\.json below it"):
+        write_folder_report(tmp_path)
+    (tmp_path / "metrics.json").write_text("{")
+    with pytest.raises(DataError, match="not readable JSON"):
+        write_run_report(tmp_path)
+    (tmp_path / "metrics.json").write_text("{}")
+    with pytest.raises(DataError, match="lacks psnr"):
+        write_run_report(tmp_path)
+    (tmp_path / "curve.csv").write_text("step,loss\n1,2\n")
+    with pytest.raises(DataError, match="expected `seconds`"):
+        read_curve(tmp_path / "curve.csv")

@@ -1,0 +1,39 @@
+import time
+
+import pytest
+import torch
+
+from charnerf.evaluation.environment import environment
+from charnerf.evaluation.timing import Stopwatch, process_peak_mib
+
+
+def test_stages_report_medians_and_drop_what_raised():
+    with Stopwatch(torch.device("cpu")) as watch:
+        for pause in (0.0, 0.02, 0.2):
+            with watch.stage("nap"):
+                time.sleep(pause)
+        with pytest.raises(KeyError), watch.stage("fails"):
+            raise KeyError
+    assert 0.02 <= watch.median_seconds("nap") < 0.15
+    assert watch.median_seconds("fails") is None
+    assert watch.median_seconds("never") is None
+
+
+def test_memory_of_a_stage_is_seen_after_it_was_freed():
+    size = 256
+    with Stopwatch(torch.device("cpu")) as watch:
+        with watch.stage("small"):
+            time.sleep(0.05)
+        with watch.stage("large"):
+            held = torch.ones(size * 1024 * 256)  # size MiB
+            time.sleep(0.1)
+            del held
+    peaks = watch.peaks_mib()
+    assert peaks["large"] > peaks["small"] + 0.8 * size
+    assert process_peak_mib() > peaks["large"] - 64
+
+
+def test_environment_gives_the_commit_or_the_reason():
+    found = environment(torch.device("cpu"))
+    assert (found["commit"] is None) == ("commit_reason" in found)
+    assert found["threads"] == torch.get_num_threads()
