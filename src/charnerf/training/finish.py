@@ -54,7 +54,7 @@ def finish_run(
         root,
         cfg.sampling.test_split,
         views=cfg.scale.eval_views or "all",
-        output=folder / "images",
+        output=folder,
         mesh=make_mesh,
         device=device,
         train_seconds=train_seconds,
