@@ -8,6 +8,7 @@ from pathlib import Path
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
 from omegaconf import DictConfig
 
 from charnerf.config import validate
@@ -23,7 +24,7 @@ def train(cfg: DictConfig) -> None:
 
     job = HydraConfig.get()
     validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
-    if job.mode.name == "MULTIRUN":
+    if job.mode is RunMode.MULTIRUN:
         sweeps.add(Path(job.sweep.dir))
     run_training(cfg, Path(job.runtime.output_dir))
 

@@ -80,12 +80,12 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
                 broken.append((job, error))
     if not broken:
         return
-    job, error = broken[0]
+    first, problem = broken[0]
     if not args.multirun:
-        raise error
+        raise problem
     raise ConfigError(
-        f"{len(broken)} of {len(jobs)} jobs can not start, so none was; first `{' '.join(job)}`:\n{error}"
-    ) from error
+        f"{len(broken)} of {len(jobs)} jobs can not start, so none was; first `{' '.join(first)}`:\n{problem}"
+    ) from problem
 
 
 def trusted_by(overrides: Sequence[str]) -> list[str]:
