@@ -25,7 +25,7 @@ SIZE = 32
 OVERSAMPLING = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure:
     """Capsules: ends a, b (K, 3), radii (K,), m, and colours (K, 3); equal ends make a ball."""
 

@@ -20,6 +20,7 @@ log = logging.getLogger(__name__)
 MASK_ALPHA = 0.05  # a pixel that is covered this much belongs to the silhouette
 WIDEST_DILATION = 32.0  # pixels; drawings that disagree by more are not of one character
 MAP_SIZE = 128  # pixels a side, at most, of the front-depth and edge-distance maps
+ROUNDING = 2.0**0.5  # pixels by which distances read at two pixels' centres may be off, at most
 
 
 def build_hull(
@@ -139,7 +140,7 @@ def _distance_to(mask: Tensor) -> Tensor:
 def _may_touch(
     outside: Tensor, cameras: Cameras, dilations: Tensor, centres: Tensor, radius: Tensor
 ) -> Tensor:
-    """Whether balls around centres (P, 3) of a radius, m, may project into every silhouette, (P,) bool."""
+    """Whether balls around centres (P, 3) of a radius, m, may project into every dilated silhouette, (P,) bool."""
     height, width = outside.shape[-2:]
     keep = torch.arange(len(centres), device=centres.device)
     for view in range(len(outside)):
@@ -173,8 +174,10 @@ def _occupancy(
     while True:
         cell = (high - low) / side
         centres = low + (index + 0.5) * cell
-        index = index[_may_touch(outside, cameras, dilations, centres, 0.5 * cell.norm())]
-        if side >= grid_size:
+        is_last = side >= grid_size
+        margins = dilations if is_last else dilations + ROUNDING  # no child is lost to the rounding to pixels
+        index = index[_may_touch(outside, cameras, margins, centres, 0.5 * cell.norm())]
+        if is_last:
             break
         index = (2 * index[:, None] + octants).reshape(-1, 3)
         side *= 2
