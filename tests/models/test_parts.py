@@ -1,0 +1,196 @@
+"""Heads, density wirings, inputs of f1 and the rule of views, each by itself."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+import helpers
+import tiny_models
+from charnerf.geometry.cameras import mirror_cameras
+from charnerf.geometry.safe import safe_normalize
+from charnerf.models.features.base import ViewReadings
+from charnerf.models.features.image import ImageFeatures
+from charnerf.models.features.image_hull import ImageHullFeatures
+from charnerf.models.heads.blend import BlendHead
+from charnerf.models.heads.radiance import RadianceHead
+from charnerf.models.inputs import PointInputs
+from charnerf.models.mlp import residual_blocks
+from charnerf.models.stages import encode_directions
+from charnerf.models.views.mirrored import MirroredSide
+from charnerf.models.views.turnaround import Turnaround
+from charnerf.types import SourceViews
+
+WIDTH = tiny_models.WIDTH
+
+
+def point_inputs(num_points: int = 9, num_views: int = 3, *, extras: int = 0) -> PointInputs:
+    """Random points as views see them, float64."""
+    random = lambda *shape: torch.randn(*shape, dtype=torch.float64)  # noqa: E731
+    return PointInputs(
+        latents=random(num_points, num_views, WIDTH),
+        extras=random(num_points, num_views, extras),
+        source_rgb=torch.rand(num_points, num_views, 3, dtype=torch.float64),
+        visibility=torch.rand(num_points, num_views, dtype=torch.float64),
+        valid=torch.rand(num_points, num_views) < 0.6,
+        encoded_points=random(num_points, 6 * tiny_models.FREQUENCIES),
+        view_dirs=safe_normalize(random(num_points, 3)),
+        source_dirs=safe_normalize(random(num_points, num_views, 3)),
+    )
+
+
+def test_a_closed_gate_keeps_the_blend_within_the_source_colours():
+    """A convex combination of the colours of the valid views; with one valid view, its very colour."""
+    inputs = point_inputs(200)
+    head = tiny_models.shake(BlendHead(width=WIDTH, hidden=8).double())
+    with torch.no_grad():
+        head.free.bias[3] = -1e4
+    features, views = torch.randn(200, WIDTH).double(), torch.randn(200, 3, WIDTH).double()
+    rgb = head(features, views, inputs)
+    counted = (inputs.valid | ~inputs.valid.any(-1, keepdim=True))[..., None]
+    low = torch.where(counted, inputs.source_rgb, 2.0).amin(1)
+    high = torch.where(counted, inputs.source_rgb, -1.0).amax(1)
+    assert ((rgb >= low - 1e-12) & (rgb <= high + 1e-12)).all()
+    one = inputs.valid.sum(-1) == 1
+    torch.testing.assert_close(rgb[one], inputs.source_rgb[inputs.valid & one[:, None]])
+    with torch.no_grad():
+        head.free.bias[3] = 1e4
+    free = head(features, views, inputs)
+    other = head(features, views, replace(inputs, source_rgb=1.0 - inputs.source_rgb))
+    torch.testing.assert_close(free, other)  # wide open, the drawings' colours do not matter
+
+
+def test_a_new_blend_head_prefers_the_view_that_sees_the_point():
+    inputs = point_inputs(50, 2)
+    visibility = torch.tensor((1.0, 0.0)).double().expand(50, 2)
+    inputs = replace(inputs, visibility=visibility, valid=torch.ones(50, 2, dtype=torch.bool))
+    head = BlendHead(width=WIDTH, hidden=8).double()
+    with torch.no_grad():
+        head.free.bias[3] = -1e4
+        head.score.weight.zero_()
+    rgb = head(torch.zeros(50, WIDTH).double(), torch.zeros(50, 2, WIDTH).double(), inputs)
+    share = torch.sigmoid(torch.tensor(2.0)).double()
+    torch.testing.assert_close(rgb, share * inputs.source_rgb[:, 0] + (1 - share) * inputs.source_rgb[:, 1])
+
+
+@pytest.mark.parametrize("head", [BlendHead(width=WIDTH, hidden=8), RadianceHead(width=WIDTH)])
+def test_heads_answer_colours_and_pass_gradcheck(head):
+    head = tiny_models.shake(head.double())
+    inputs = point_inputs(4)
+    features = torch.randn(4, WIDTH, dtype=torch.float64, requires_grad=True)
+    views = torch.randn(4, 3, WIDTH, dtype=torch.float64, requires_grad=True)
+    rgb = head(50.0 * features, 50.0 * views, inputs)
+    assert ((rgb >= 0) & (rgb <= 1)).all()
+    assert torch.autograd.gradcheck(lambda f, v: head(f, v, inputs), (features, views))
+
+
+@pytest.mark.parametrize("combining", tiny_models.COMBINATORS)
+@pytest.mark.parametrize("density", ["view_free", "view_dependent"])
+@pytest.mark.parametrize("head", ["blend", "radiance"])
+def test_what_sees_directions(combining, density, head):
+    """view_free: the density is one number a point and only the colour turns with the query; else both do."""
+    field = tiny_models.tiny_model(combining=combining, density=density, head=head, features="image").coarse
+    field = tiny_models.shake(field.double())
+    inputs = point_inputs()
+    with torch.no_grad():
+        one = field(inputs)
+        other = field(replace(inputs, view_dirs=safe_normalize(torch.randn(9, 3, dtype=torch.float64))))
+    assert torch.equal(one.densities, other.densities) != field.density.sees_directions
+    assert (one.rgb - other.rgb).abs().amax() > 1e-3
+    assert (one.densities >= 0).all() and field.density.sees_directions == (density == "view_dependent")
+
+
+@pytest.mark.parametrize("num_views", range(1, 9))
+def test_a_field_of_one_to_eight_views(num_views):
+    """Any number, in any order, with a finite gradient for every parameter."""
+    model = tiny_models.tiny_model(features="image")
+    field = tiny_models.shake(model.coarse.double())
+    inputs = point_inputs(6, num_views)
+    answer = field(inputs)
+    order = torch.randperm(num_views)
+    turned = {
+        name: getattr(inputs, name)[:, order]
+        for name in ("latents", "extras", "source_rgb", "visibility", "valid", "source_dirs")
+    }
+    again = field(replace(inputs, **turned))
+    torch.testing.assert_close(again.rgb, answer.rgb)
+    torch.testing.assert_close(again.densities, answer.densities)
+    (answer.rgb.sum() + answer.densities.sum()).backward()
+    assert all(p.grad is None or p.grad.isfinite().all() for p in field.parameters())
+
+
+def test_directions_are_encoded_one_to_one():
+    """Opposite directions, which eq. 1 alone gives one code, and no direction have their own."""
+    axes = torch.cat((torch.eye(3), -torch.eye(3), torch.zeros(1, 3))).double()
+    codes = encode_directions(axes)
+    assert codes.shape == (7, 12)
+    assert (torch.cdist(codes, codes) + 9 * torch.eye(7)).min() > 0.5
+
+
+def test_new_residual_blocks_are_the_identity():
+    x = torch.randn(5, 8)
+    assert torch.equal(residual_blocks(width=8, num_blocks=3)(x), x)
+    assert torch.equal(residual_blocks(width=8, num_blocks=0)(x), x)
+    blocks = tiny_models.shake(residual_blocks(width=8, num_blocks=1))
+    first, second = blocks[0].first, blocks[0].second
+    torch.testing.assert_close(blocks(x), x + second(torch.relu(first(torch.relu(x)))))
+
+
+def test_image_hull_features_by_hand():
+    readings = ViewReadings(
+        source_rgb=torch.tensor((((0.0, 0.5, 1.0),),)),
+        behind=torch.tensor(((0.1,),)),
+        edge=torch.tensor(((-0.02,),)),
+        source_dirs=torch.tensor((((0.0, 1.0, 0.0),),)),
+        mirrored=torch.tensor((1.0,)),
+    )
+    numbers = torch.tanh(torch.tensor((0.4, 2.0, -0.16, -0.8)))
+    expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))
+    features = ImageHullFeatures()
+    torch.testing.assert_close(features(readings)[0, 0], expected)
+    assert features.num_extras == 11
+    assert ImageFeatures()(readings).shape == (1, 1, 0) and ImageFeatures().num_extras == 0
+
+
+def test_the_mirrored_side_of_a_symmetric_figure_is_its_picture_from_270():
+    views = helpers.source_views(helpers.person())
+    used = MirroredSide()(views)
+    truth = helpers.source_views(helpers.person(), helpers.source_cameras((270.0,)))
+    assert used.images.shape[1] == 4
+    torch.testing.assert_close(used.images[0, 3], truth.images[0, 0], atol=0.02, rtol=0)
+    torch.testing.assert_close(
+        used.cameras.world_from_camera[0, 3], truth.cameras.world_from_camera[0, 0], atol=1e-6, rtol=0
+    )
+    assert used.mirrored.tolist() == [[False, False, False, True]] and used.present.all()
+    torch.testing.assert_close(used.images[:, :3], views.images, atol=0, rtol=0)
+    asymmetric = helpers.source_views(helpers.person(symmetric=False))
+    other = helpers.source_views(helpers.person(symmetric=False), helpers.source_cameras((270.0,)))
+    assert (MirroredSide()(asymmetric).images[0, 3] - other.images[0, 0]).abs().max() > 0.3
+
+
+def test_only_sides_that_are_there_are_mirrored():
+    front_back = helpers.source_views(helpers.person(), helpers.source_cameras((0.0, 180.0)))
+    assert MirroredSide()(front_back) is front_back
+    views = helpers.source_views(helpers.person())
+    assert Turnaround()(views) is views
+    used = MirroredSide()(views)
+    absent = replace(views, present=torch.tensor(((True, False, True),)))
+    assert MirroredSide()(absent).images.shape[1] == 3
+    camera = mirror_cameras(views.cameras[0, 1])
+    assert torch.equal(camera.world_from_camera, used.cameras.world_from_camera[0, 3])
+
+
+def test_in_a_batch_only_the_characters_own_sides_are_mirrored():
+    first = helpers.source_views(helpers.person(), helpers.source_cameras((0.0, 90.0)))
+    second = helpers.source_views(helpers.person(), helpers.source_cameras((270.0, 180.0)))
+    pair = lambda name: torch.cat((getattr(first, name), getattr(second, name)))  # noqa: E731
+    cameras = replace(
+        first.cameras,
+        **{
+            name: torch.cat((getattr(first.cameras, name), getattr(second.cameras, name)))
+            for name in ("world_from_camera", "focal", "principal_point", "orthographic")
+        },
+    )
+    used = MirroredSide()(SourceViews(pair("images"), cameras, pair("present"), pair("mirrored")))
+    assert used.present.tolist() == [[True, True, False, True], [True, True, True, False]]
+    assert used.mirrored.tolist() == [[False, False, True, True]] * 2
