@@ -40,7 +40,7 @@ def paint(view: str) -> Image.Image:
             _box(draw, -0.15, 0.95, 0.15, 1.35, (255, 255, 255, 255))
         _disc(draw, 0.0, 1.75, 0.25, (230, 180, 150, 255))
         _box(draw, -0.75, 1.3, 0.75, 1.42, (30, 60, 200, 255))
-        # the shield hangs at the character's left, the picture's right from the front; the other side has a hand
+        # the shield hangs at the character's left, the picture's right from the front
         _disc(draw, 0.65 * flip, 1.2, 0.2, (180, 160, 40, 255))
     return picture
 

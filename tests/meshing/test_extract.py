@@ -1,5 +1,7 @@
 """Surfaces: exactness on a sphere, floaters, decimation, the choice of the level."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -62,7 +64,7 @@ def test_empty_field_says_its_range():
     grid = DensityGrid(np.full((8, 8, 8), 0.25, np.float32), np.zeros(3), 0.1, LeftOut())
     with pytest.raises(NumericalError, match=r"found densities from 0.25 to 0.25 1/m.*above the level 15"):
         extract_surface(grid, 15.0)
-    with pytest.raises(NumericalError, match=r"found densities from 0 to 0.*no level from 2 to 400"):
+    with pytest.raises(NumericalError, match=r"found densities from 0 to 0.*no ray loses half"):
         build_mesh(scene_of(sphere, peak=0.0), None, resolution=32)
     with pytest.raises(DataError, match="level: found -1"):
         extract_surface(grid, -1.0)
@@ -109,23 +111,34 @@ def _views_of(distance, size: int = 96) -> SourceViews:
     return SourceViews(images, cameras[None], ~flags, flags)
 
 
-def test_level_is_the_one_whose_silhouettes_fit():
-    """Haze of 6 per metre around a figure of 200: the level lands between, at any scale."""
+def test_level_is_where_rendering_sees_the_surface():
+    """Haze around a figure: the level keeps it out, at any scale of the densities."""
     for scale in (1.0, 0.3):
-        scene = scene_of(figure, width=0.02, peak=200.0 * scale)
-        field = scene.field
+        scene = scene_of(figure, width=0.04, peak=200.0 * scale)
 
-        def with_haze(points, view_dirs, field=field, factor=scale):
+        def with_haze(points, view_dirs, field=scene.field, factor=scale):
             output = field(points, view_dirs)
-            haze = 1.0 * factor * (figure(points) > -0.1)
-            return type(output)(output.rgb, output.densities + haze)
+            return type(output)(output.rgb, output.densities + factor * (figure(points) > -0.1))
 
-        scene = type(scene)(with_haze, scene.hull, scene.box_min, scene.box_max)
+        scene = dataclasses.replace(scene, field=with_haze)
         grid = GridSampler(scene, resolution=64, num_cameras=1).evaluate_all()
         choice = choose_level(grid, _views_of(figure))
-        assert 2.0 < choice.level < 200.0 * scale
-        assert choice.iou > 0.85
+        assert 2.0 * scale < choice.chosen.level < 100.0 * scale
+        assert choice.chosen.depth_error < 0.03
+        assert choice.chosen.mask_iou > 0.8
         assert len(choice.tried) == len(LEVELS)
+
+
+def test_level_of_a_slab_is_the_density_where_half_of_the_light_is_gone():
+    """Density a * x at depth x below the surface: half is gone at x = sqrt(2 ln 2 / a)."""
+    slope = 3000.0
+    axis = np.arange(97) * 0.01
+    depth = np.minimum(axis, axis[::-1])
+    block = np.minimum(np.minimum(depth[:, None, None], depth[None, :, None]), depth[None, None, :])
+    grid = DensityGrid((slope * block).astype(np.float32), np.zeros(3), 0.01, LeftOut())
+    half_gone = np.sqrt(2.0 * np.log(2.0) * slope)  # 1/m, along the normal; slanted rays go less deep
+    level = choose_level(grid, None).chosen.level
+    assert 0.45 * half_gone < level < 1.1 * half_gone
 
 
 def test_built_mesh_is_coloured_and_of_the_asked_size():

@@ -55,11 +55,11 @@ def build_mesh(
 
     Args:
         scene: One character's field.
-        views: Its drawings (B = 1), evidence for the level beside the field's own opacity.
+        views: Its drawings (B = 1), whose silhouettes are compared with the surface's.
         resolution: Grid points along the longest side of the hull.
         num_cameras: Cameras whose directions the density is averaged over.
         faces: Faces after decimation; None keeps all.
-        level: Density of the surface, 1/m; None chooses it by silhouettes.
+        level: Density of the surface, 1/m; None chooses it by rendered depths.
         height: Height to scale to, m, with the lowest point on z = 0; None leaves size and place as the
             field has them.
         on_points: Called with the number of grid points after each piece of work.
@@ -73,7 +73,7 @@ def build_mesh(
     choice = None
     if level is None:
         choice = choose_level(sampler.evaluate_coarse(2 if resolution < 192 else 4), views)
-        level = choice.level
+        level = choice.chosen.level
     grid = sampler.evaluate_surface(level)
     surface = extract_surface(grid, level, density_at=sampler.density_at)
     mesh = surface.mesh if faces is None else simplify(surface.mesh, faces)

@@ -1,12 +1,16 @@
-"""The density at which a field's surface lies, chosen by silhouettes instead of by a magic number.
+"""The density at which a field's surface lies, chosen by what rendering shows instead of by a magic number.
 
 A surface drawn at too low a density takes in haze, at too high a density it loses hands and feet. What
-decides is what volume rendering of the same densities shows: seen from around, the surface should have the
-silhouettes of the rendered opacity, and seen from the drawings those of their masks.
+decides is where rendering sees the surface: along each ray of cameras around the character, the depth at
+which half of the light is gone. The level whose surface lies nearest to these depths is taken; how its
+silhouettes fit the drawings' masks is reported beside it. (On five real characters a young model's best
+F-scores lay at 8 to 20 per metre and this rule chose 8 to 16; silhouettes alone, rendered or drawn, chose
+3 to 8: they do not see haze in hollows.)
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,104 +25,151 @@ from charnerf.meshing.density_grid import DensityGrid
 from charnerf.types import Cameras, RayBundle, SourceViews
 
 LEVELS = tuple(float(x) for x in np.round(np.geomspace(2.0, 400.0, 24), 3))  # 1/m
-MIDDLE_LEVEL = 20.0  # 1/m
+MIDDLE_LEVEL = 20.0  # 1/m; where interpolation between grid points is most faithful
 AROUND = 12  # cameras around the character
-PICTURE = 96  # pixels a side of their pictures
-RENDERED_ALPHA = 0.5  # a rendered pixel belongs to the silhouette from this opacity on
+PICTURE = 80  # pixels a side of their pictures
+HALF_GONE = math.log(2.0)  # optical depth at which half of the light is gone
+WORST = 0.08  # metres: a depth wrong by more, or a ray that only one of the two sees hit, counts as this
 MASK_ALPHA = 0.5
 
 
 @dataclass(frozen=True)
-class LevelChoice:
-    """The chosen level and its evidence.
+class LevelTried:
+    """Evidence for one level, 1/m.
 
     Attributes:
         level: Density, 1/m.
-        iou: Agreement of silhouettes at the level, mean of the two below where both exist.
-        tried: For each level tried (level, IoU with rendered opacity, IoU with the drawings' masks or NaN).
+        depth_error: Mean distance of its surface from the rendered depths, m.
+        mask_iou: Agreement of its silhouettes with the drawings' masks; NaN without drawings.
     """
 
     level: float
-    iou: float
-    tried: tuple[tuple[float, float, float], ...]
+    depth_error: float
+    mask_iou: float
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """The chosen level, its own evidence and that of all levels tried."""
+
+    chosen: LevelTried
+    tried: tuple[LevelTried, ...]
+
+
+@dataclass(frozen=True)
+class _March:
+    """What rays (R,) meet in the grid.
+
+    Attributes:
+        first: Depth of the surface of each level, (R, L), m; infinite where there is none.
+        median: Depth at which half of the light is gone, (R,), m; infinite where less is.
+    """
+
+    first: Tensor
+    median: Tensor
 
 
 @torch.no_grad()
 def choose_level(grid: DensityGrid, views: SourceViews | None) -> LevelChoice:
-    """Choose the density whose surface has the silhouettes that rendering and the drawings show.
+    """Choose the density whose surface lies where rendering sees it.
 
     Args:
         grid: Densities.
         views: The drawings (B = 1), or None where there are none.
 
     Raises:
-        NumericalError: If the grid is empty at all levels.
+        NumericalError: If no ray around the character loses half of its light.
     """
-    volume = torch.from_numpy(np.ascontiguousarray(grid.densities))
-    corner = torch.from_numpy(grid.origin).float()
-    extent = torch.tensor([n - 1 for n in grid.densities.shape]) * grid.spacing
-    centre = corner + 0.5 * extent
+    extent = (torch.tensor(grid.densities.shape) - 1) * grid.spacing
     half = float(0.5 * extent.norm())
     angles = torch.arange(AROUND) * (360.0 / AROUND) + 15.0
     around = cameras_towards(
         direction_from_angles(angles, torch.full_like(angles, 15.0)),
-        target=centre, distance=half + 4.0, half_extent=half, size=PICTURE, orthographic=True,
-    )  # fmt: skip
-    rendered = [_march(grid, volume, around[i]) for i in range(AROUND)]
-    drawn = []
-    if views is not None:
-        for v in (views.present[0] & ~views.mirrored[0]).nonzero()[:, 0].tolist():
-            stride = max(1, -(-views.images.shape[-1] // 160))
-            peak, _ = _march(grid, volume, views.cameras[0, v].to("cpu"), stride)
-            drawn.append(
-                (peak, views.images[0, v, 3, stride // 2 :: stride, stride // 2 :: stride].cpu() > MASK_ALPHA)
-            )
-    tried = []
-    for level in LEVELS:
-        ious = [_iou(peak > level, opacity > RENDERED_ALPHA) for peak, opacity in rendered]
-        masks = [_iou(peak > level, mask) for peak, mask in drawn]
-        tried.append((level, float(np.mean(ious)), float(np.mean(masks)) if masks else float("nan")))
-    scores = [np.nanmean(row[1:]) for row in tried]
-    best = int(np.argmax(scores))
-    if not scores[best] > 0:
+        target=torch.from_numpy(grid.origin).float() + 0.5 * extent,
+        distance=half + 4.0,
+        half_extent=half,
+        size=PICTURE,
+        orthographic=True,
+    )
+    errors = torch.zeros(len(LEVELS), dtype=torch.float64)
+    num_seen = 0
+    for index in range(AROUND):
+        march = _march(grid, around[index])
+        seen = march.median.isfinite()
+        num_seen += int(seen.sum())
+        errors += _depth_errors(march.first, march.median[:, None]).sum(0).double()
+    if num_seen == 0:
         low, high = float(grid.densities.min()), float(grid.densities.max())
         raise NumericalError(
             f"density grid: found densities from {low:.3g} to {high:.3g} 1/m, expected an opaque figure: no "
-            "level from "
-            f"{LEVELS[0]:g} to {LEVELS[-1]:g} 1/m shows a silhouette. The field is empty: train longer, or "
-            "check the drawings' masks."
+            f"ray "
+            "loses half of its light. The field is empty: train longer, or check the drawings' masks."
         )
-    return LevelChoice(level=LEVELS[best], iou=float(scores[best]), tried=tuple(tried))
+    ious = _mask_ious(grid, views)
+    tried = tuple(
+        LevelTried(level, float(error) / num_seen, iou)
+        for level, error, iou in zip(LEVELS, errors, ious, strict=True)
+    )
+    return LevelChoice(min(tried, key=lambda one: one.depth_error), tried)
 
 
-def _march(grid: DensityGrid, volume: Tensor, camera: Cameras, stride: int = 1) -> tuple[Tensor, Tensor]:
-    """Greatest density on each pixel's ray and the opacity of the ray, (h, w) each."""
+def _depth_errors(first: Tensor, second: Tensor) -> Tensor:
+    """Distance of two depths, m, at most WORST; WORST where one is infinite, 0 where both are."""
+    both = first.isfinite() & second.isfinite()
+    one = first.isfinite() ^ second.isfinite()
+    near = torch.where(both, first - second, 0.0).abs().clamp_max(WORST)
+    return torch.where(one, WORST, near)
+
+
+def _mask_ious(grid: DensityGrid, views: SourceViews | None) -> list[float]:
+    """For each level, IoU of its silhouettes with the drawings' masks, mean over the drawings."""
+    if views is None:
+        return [math.nan] * len(LEVELS)
+    ious = []
+    for v in (views.present[0] & ~views.mirrored[0]).nonzero()[:, 0].tolist():
+        stride = max(1, -(-views.images.shape[-1] // 128))
+        every = slice(stride // 2, None, stride)
+        hit = _march(grid, views.cameras[0, v].to("cpu"), stride).first.isfinite()
+        mask = (views.images[0, v, 3, every, every].cpu() > MASK_ALPHA).reshape(-1, 1)
+        ious.append((hit & mask).sum(0) / (hit | mask).sum(0).clamp_min(1))
+    return torch.stack(ious).mean(0).tolist()
+
+
+def _march(grid: DensityGrid, camera: Cameras, stride: int = 1) -> _March:
+    """Follow every stride-th pixel's ray through the grid."""
     pixels = pixel_centres(camera.width, camera.height)[stride // 2 :: stride, stride // 2 :: stride]
     rays = pixel_rays(camera, pixels.reshape(-1, 2).to(camera.focal.dtype))
     rays = RayBundle(rays.origins.float(), rays.directions.float())
+    volume = torch.from_numpy(np.ascontiguousarray(grid.densities))
+    # interpolated in a scale that runs nearly straight through a surface, as density itself does not
+    contrast = (volume / (volume + MIDDLE_LEVEL))[None, None]
     corner = torch.from_numpy(grid.origin).float()
-    extent = torch.tensor([n - 1 for n in volume.shape]) * grid.spacing
+    extent = (torch.tensor(volume.shape) - 1) * grid.spacing
     near, far = box_interval(rays, corner, corner + extent)
-    volume_contrast = volume / (volume + MIDDLE_LEVEL)  # interpolated as the surface is, nearly
-    hit = (far > near).nonzero()[:, 0]
-    peak, opacity = torch.zeros(len(near)), torch.zeros(len(near))
+    levels = torch.tensor(LEVELS)
+    thresholds = levels / (levels + MIDDLE_LEVEL)
     num = int(1.5 * max(volume.shape))
     middle = (torch.arange(num) + 0.5) / num
-    for part in hit.split(4096):
+    first = torch.full((len(near), len(LEVELS)), math.inf)
+    median = torch.full((len(near),), math.inf)
+    for part in (far > near).nonzero()[:, 0].split(4096):
         length = far[part] - near[part]
         points = points_along(rays[part], near[part, None] + length[:, None] * middle)
         at = 2.0 * (points - corner) / extent - 1.0
         # grid_sample takes the last axis of the volume first
-        read = grid_sample(volume[None, None], at.flip(-1)[None, None], align_corners=True)[0, 0, 0]
-        contrast = grid_sample(volume_contrast[None, None], at.flip(-1)[None, None], align_corners=True)[
-            0, 0, 0
-        ]
-        share = contrast.amax(-1).clamp(0.0, 1.0 - 1e-6)
-        peak[part] = MIDDLE_LEVEL * share / (1.0 - share)
-        opacity[part] = -torch.expm1(-read.sum(-1) * length / num)
-    return peak.reshape(pixels.shape[:2]), opacity.reshape(pixels.shape[:2])
+        read = grid_sample(contrast, at.flip(-1)[None, None], align_corners=True)[0, 0, 0]
+        densities = MIDDLE_LEVEL * read / (1.0 - read).clamp_min(1e-6)
+        depth = (densities.cumsum(-1) * (length / num)[:, None]).contiguous()
+        half_gone = torch.searchsorted(depth, torch.full((len(part), 1), HALF_GONE))
+        median[part] = _depth_at(half_gone + 0.5, near, far, part, num)[:, 0]
+        peak = read.cummax(-1).values.contiguous()
+        index = torch.searchsorted(peak, thresholds.expand(len(part), -1).contiguous())
+        # passed between the centres of the sample before and of this one, that is at its start on average
+        first[part] = _depth_at(index, near, far, part, num)
+    return _March(first, median)
 
 
-def _iou(first: Tensor, second: Tensor) -> float:
-    union = int((first | second).sum())
-    return int((first & second).sum()) / union if union else 0.0
+def _depth_at(samples: Tensor, near: Tensor, far: Tensor, part: Tensor, num: int) -> Tensor:
+    """Depth, m, after a number of samples (R, L) of num along the rays; infinite beyond the last."""
+    depth = near[part, None] + (far - near)[part, None] * samples / num
+    return torch.where(samples < num, depth, math.inf)

@@ -74,15 +74,15 @@ def _mesh_lines(built: BuiltMesh) -> list[str]:
     ]
     if built.choice is None:
         return [*lines, "- The density was given, not chosen."]
-    lines += [
-        "",
-        "The density was chosen by silhouettes, IoU with those of the pictures rendered from around",
-    ]
-    lines += ["and with the drawings':", "", "| density | rendered | drawings |", "|---|---|---|"]
+    lines += ["", "The density was chosen so that the surface lies where rendering, seen from around, loses"]
+    lines += ["half of its light. IoU: of the surface's silhouettes with the drawings.", ""]
+    lines += ["| density | distance, mm | IoU |", "|---|---|---|"]
     tried = built.choice.tried
     step = max(1, len(tried) // ROWS_OF_LEVELS)
-    for index, (level, rendered, drawn) in enumerate(tried):
-        if index % step == 0 or level == built.level:
-            mark = "**" if level == built.level else ""
-            lines.append(f"| {mark}{level:.3g}{mark} | {rendered:.3f} | {drawn:.3f} |")
+    for index, one in enumerate(tried):
+        if index % step == 0 or one.level == built.level:
+            mark = "**" if one.level == built.level else ""
+            lines.append(
+                f"| {mark}{one.level:.3g}{mark} | {1000 * one.depth_error:.1f} | {one.mask_iou:.3f} |"
+            )
     return lines

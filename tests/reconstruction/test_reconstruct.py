@@ -1,0 +1,142 @@
+"""A reconstruction's folder: whole, complete, measured; a fake network answers in place of a trained one."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import torch
+import trimesh
+from PIL import Image, ImageDraw
+
+from charnerf.drawings.turnaround import read_turnaround
+from charnerf.errors import DataError, NumericalError
+from charnerf.geometry.hull import build_hull
+from charnerf.model_api import Hero
+from charnerf.reconstruction import reconstruct
+from charnerf.types import FieldOutput, Scene
+from charnerf.volume.quadrature import PiecewiseConstant
+from charnerf.volume.renderers.culled import CulledRenderer
+
+BOX = torch.tensor([-1.8, -1.8, -0.8]), torch.tensor([1.8, 1.8, 2.8])
+
+
+def _egg(points: torch.Tensor, view_dirs: torch.Tensor) -> FieldOutput:
+    """An egg 2 m tall and 1 m wide, red in front and green behind."""
+    scaled = (points - points.new_tensor((0.0, 0.0, 1.0))) / points.new_tensor((0.5, 0.5, 1.0))
+    densities = 300.0 * torch.sigmoid((1.0 - scaled.norm(dim=-1)) * 60.0)
+    front = (points[:, 1] < 0)[:, None]
+    return FieldOutput(
+        torch.where(front, points.new_tensor((0.9, 0.1, 0.1)), points.new_tensor((0.1, 0.8, 0.1))), densities
+    )
+
+
+class FakeModel:
+    """What `reconstruct` asks of a model."""
+
+    source = Path("weights.safetensors")
+
+    def __init__(self, density: float = 1.0) -> None:
+        self.density = density
+
+    def encode(self, *, front, side, back, side_is) -> Hero:
+        turnaround = read_turnaround(front, side, back, size=64, side_is=side_is)
+        hull = build_hull(turnaround.views, box_min=BOX[0], box_max=BOX[1], grid_size=32)[0]
+
+        def field(points, view_dirs):
+            output = _egg(points, view_dirs)
+            return replace(output, densities=self.density * output.densities)
+
+        renderer = CulledRenderer(
+            quadrature=PiecewiseConstant(), num_coarse=24, num_fine=0, hull_steps=64, memory_mib=64
+        )
+        return Hero(Scene(field, None, hull, *BOX, False), turnaround.views, renderer, turnaround)
+
+
+@pytest.fixture
+def drawings(tmp_path) -> dict[str, Path]:
+    paths = {}
+    for view, colour in (("front", "red"), ("side", "orange"), ("back", "green")):
+        picture = Image.new("RGB", (200, 260), "white")
+        ImageDraw.Draw(picture).ellipse((50, 30, 150, 230), fill=colour)
+        paths[view] = tmp_path / f"{view}.png"
+        picture.save(paths[view])
+    return paths
+
+
+OPTIONS = {"resolution": 32, "faces": 600, "frames": 6, "size": 48, "num_cameras": 2}
+
+
+def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
+    done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["drawings.png", "mesh.glb", "report.md", done.turntable.name, "views"]
+    assert sorted(v.name for v in done.views) == [f"{60 * k:03d}.png" for k in range(6)]
+    mesh = trimesh.load(done.mesh, force="mesh", process=False)
+    np.testing.assert_allclose(mesh.bounds[:, 1], (0.0, 2.0), atol=1e-6)  # Y up
+    assert mesh.extents[0] == pytest.approx(1.0, abs=0.06)
+    assert len(mesh.faces) <= 600
+    front = np.asarray(Image.open(tmp_path / "out" / "views" / "000.png"))[24, 24]
+    back = np.asarray(Image.open(tmp_path / "out" / "views" / "180.png"))[24, 24]
+    assert front[0] > 200 and front[1] < 60 and front[3] > 240
+    assert back[1] > 180 and back[0] < 60
+    assert iio.imread(done.turntable).shape == (6, 48, 48, 3)
+
+
+def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
+    done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
+    text = done.report.read_text()
+    for words in (
+        "floor line",
+        "left side",
+        "grid's points were left out",
+        "| density |",
+        "| encode |",
+        "weights.safet",
+    ):
+        assert words in text
+    for line in text.splitlines():  # every file shown is there
+        for part in line.split("](")[1:]:
+            assert (done.report.parent / part.split(")")[0]).exists()
+
+
+def test_a_second_run_replaces_its_pieces_and_nothing_else(tmp_path, drawings):
+    output = tmp_path / "out"
+    output.mkdir()
+    (output / "notes.txt").write_text("mine")
+    (output / "turntable.gif").write_text("old")
+    (output / "views").mkdir()
+    (output / "views" / "007.png").write_text("old")
+    reconstruct(FakeModel(), **drawings, output=output, **OPTIONS)
+    assert (output / "notes.txt").read_text() == "mine"
+    assert not (output / "views" / "007.png").exists()
+    assert len(list(output.glob("turntable.*"))) == 1
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_nothing_is_left_of_a_failure(tmp_path, drawings):
+    with pytest.raises(NumericalError, match="The field is empty"):
+        reconstruct(FakeModel(density=0.0), **drawings, output=tmp_path / "out", **OPTIONS)
+    with pytest.raises(DataError, match=r"gone\.png"):
+        reconstruct(
+            FakeModel(), **{**drawings, "side": tmp_path / "gone.png"}, output=tmp_path / "out", **OPTIONS
+        )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["back.png", "front.png", "side.png"]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DataError, match="found a file, expected a folder"):
+        reconstruct(FakeModel(), **drawings, output=tmp_path / "file", **OPTIONS)
+
+
+def test_without_an_encoder_the_turntable_is_a_gif(tmp_path, monkeypatch):
+    from charnerf.reconstruction import turntable
+
+    def refuses(*arguments, **options):
+        raise ImportError("no ffmpeg")
+
+    monkeypatch.setattr(turntable, "iio", SimpleNamespace(imwrite=refuses))
+    frames = [np.full((20, 20, 3), 60 * k, np.uint8) for k in range(4)]
+    path, note = turntable.write_film(frames, tmp_path)
+    assert path.name == "turntable.gif" and "no ffmpeg" in note
+    assert Image.open(path).n_frames == 4
