@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 from types import SimpleNamespace
@@ -5,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, write_figure
+from figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
 from PIL import Image
 
 from charnerf.data.characters import load_character
 from charnerf.errors import DataError, NumericalError
 from charnerf.evaluation import metrics
+from charnerf.evaluation.angles import azimuth_bin, view_angles
 from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
 from charnerf.evaluation.scores import METRIC_KEYS, on_white
 from charnerf.types import LeftOut, RenderOutput
@@ -85,10 +87,36 @@ def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):
 
 def test_fixed_views_are_the_same_every_time_and_spread(figure_dataset):
     character = load_character(figure_dataset, "ball")
-    assert fixed_views(character, 3) == [1, 3, 5]
+    assert fixed_views(character, 3) == fixed_views(character, 3)
+    assert len(set(fixed_views(character, 3))) == 3
     assert fixed_views(character, 100) == fixed_views(character, "all") == list(range(7))
     with pytest.raises(DataError, match="views: found 0"):
         fixed_views(character, 0)
+
+
+@pytest.mark.parametrize("num_frames", [24, 64, 100, 200])
+def test_fixed_views_reach_every_azimuth_whatever_the_number_of_frames(figure_dataset, num_frames):
+    """Every n-th of 64 or 100 Fibonacci frames leaves four azimuth bins of twelve empty."""
+    character = dataclasses.replace(
+        load_character(figure_dataset, "ball"), cameras=target_cameras(num_frames)
+    )
+    chosen = fixed_views(character, 24)
+    found = view_angles(character.cameras[chosen], character.sources)
+    assert len({azimuth_bin(float(azimuth)) for azimuth in found.azimuth_deg}) == 12
+    assert float(found.elevation_deg.mean()) == pytest.approx(32.7, abs=2.0)
+
+
+def test_source_views_are_never_counted(figure_dataset):
+    character = load_character(figure_dataset, "ball")
+    sources = character.sources.cameras
+    poses = character.cameras.world_from_camera.clone()
+    poses[2] = sources.world_from_camera[0, 1]
+    parallel = character.cameras.orthographic.clone()
+    cameras = dataclasses.replace(character.cameras, world_from_camera=poses)
+    assert 2 in fixed_views(dataclasses.replace(character, cameras=cameras), "all")  # a pinhole is no drawing
+    parallel[2] = True
+    cameras = dataclasses.replace(cameras, orthographic=parallel)
+    assert 2 not in fixed_views(dataclasses.replace(character, cameras=cameras), "all")
 
 
 def test_what_was_not_made_is_null_with_its_reason(figure_dataset):
@@ -126,7 +154,7 @@ def test_a_prediction_of_nan_names_its_picture(figure_dataset):
             output = RenderOutput(torch.full((*shape, 3), math.nan), torch.zeros(shape), torch.zeros(shape))
             return SimpleNamespace(finest=output, left_out=LeftOut())
 
-    with pytest.raises(NumericalError, match="ball, view 3: rgb"):
+    with pytest.raises(NumericalError, match=r"ball, view \d: rgb"):
         evaluate(BlindModel(), Broken(), figure_dataset, "test", views=1, progress=False)
 
 

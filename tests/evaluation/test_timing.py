@@ -9,12 +9,12 @@ from charnerf.evaluation.timing import Stopwatch, process_peak_mib
 
 def test_stages_report_medians_and_drop_what_raised():
     with Stopwatch(torch.device("cpu")) as watch:
-        for pause in (0.0, 0.02, 0.2):
+        for pause in (0.0, 0.02, 0.5):
             with watch.stage("nap"):
                 time.sleep(pause)
         with pytest.raises(KeyError), watch.stage("fails"):
             raise KeyError
-    assert 0.02 <= watch.median_seconds("nap") < 0.15
+    assert 0.02 <= watch.median_seconds("nap") < 0.5 * watch.total_seconds("nap")
     assert watch.median_seconds("fails") is None
     assert watch.median_seconds("never") is None
 

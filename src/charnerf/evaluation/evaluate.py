@@ -1,6 +1,5 @@
 """A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -18,6 +17,7 @@ from charnerf.evaluation.baselines import VisualHullBaseline, white_prediction
 from charnerf.evaluation.metrics_file import Collected, collected_metrics, write_metrics
 from charnerf.evaluation.pictures import save_prediction, save_sheet
 from charnerf.evaluation.scores import CharacterScores, score_view, to_cpu
+from charnerf.geometry.cameras import fibonacci_hemisphere
 from charnerf.types import Cameras, LeftOut, RenderOutput, SourceViews
 
 __all__ = [
@@ -80,6 +80,9 @@ class EvaluatedRenderer(Protocol):
 def fixed_views(character: Character, views: int | Literal["all"]) -> list[int]:
     """Indices of the frames to evaluate: evenly chosen, the same every time, none of them a source view.
 
+    Each of `views` even directions of the hemisphere takes the nearest frame that is still free: every n-th
+    frame of a capture's spiral would leave whole azimuths out.
+
     Raises:
         DataError: If the character has no such frame.
     """
@@ -99,7 +102,14 @@ def fixed_views(character: Character, views: int | Literal["all"]) -> list[int]:
         return frames
     if views < 1:
         raise DataError(f"views: found {views}, expected at least 1, or 'all'.")
-    return [frames[math.floor((index + 0.5) * len(frames) / views)] for index in range(views)]
+    towards = poses[frames][:, :3, 2].double()
+    free = torch.ones(len(frames), dtype=torch.bool)
+    chosen = []
+    for ideal in fibonacci_hemisphere(views):
+        nearest = int(torch.where(free, towards @ ideal, -torch.inf).argmax())
+        free[nearest] = False
+        chosen.append(frames[nearest])
+    return sorted(chosen)
 
 
 def evaluate(

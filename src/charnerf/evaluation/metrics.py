@@ -202,8 +202,7 @@ def chamfer_mm(predicted: np.ndarray, true: np.ndarray) -> float:
         NumericalError: If a coordinate is not finite.
         ShapeError: If a set is empty or not (N, 3).
     """
-    there, back = surface_distances(predicted, true)
-    return float(1000.0 * 0.5 * (there.mean() + back.mean()))
+    return chamfer_of_distances(*surface_distances(predicted, true))
 
 
 def f_score(predicted: np.ndarray, true: np.ndarray, radius: float = F_SCORE_RADIUS_M) -> float:
@@ -215,7 +214,16 @@ def f_score(predicted: np.ndarray, true: np.ndarray, radius: float = F_SCORE_RAD
 
     Source: Knapitsch 2017 (Tanks and Temples).
     """
-    there, back = surface_distances(predicted, true)
+    return f_score_of_distances(*surface_distances(predicted, true), radius=radius)
+
+
+def chamfer_of_distances(there: np.ndarray, back: np.ndarray) -> float:
+    """Chamfer distance, mm, of the two answers (N,), (M,) of `surface_distances`."""
+    return float(1000.0 * 0.5 * (there.mean() + back.mean()))
+
+
+def f_score_of_distances(there: np.ndarray, back: np.ndarray, *, radius: float = F_SCORE_RADIUS_M) -> float:
+    """F-score of the two answers (N,), (M,) of `surface_distances`."""
     precision, recall = float((there <= radius).mean()), float((back <= radius).mean())
     total = precision + recall
     return 2.0 * precision * recall / total if total else 0.0

@@ -22,6 +22,7 @@ COLUMNS = {
 }
 BASELINE_NAMES = {"visual_hull": "visual hull (carved, coloured)", "white": "white picture"}
 MAX_SHEETS = 12
+_NEEDED = (*METRIC_KEYS, "split", "num_characters", "num_views", "by_azimuth", "per_character", "seconds")
 NONE = "-"
 
 
@@ -39,7 +40,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
         ) from error
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: is not readable JSON ({error}); run `charnerf evaluate` again.") from error
-    missing = [key for key in METRIC_KEYS if not isinstance(metrics, dict) or key not in metrics]
+    missing = [key for key in _NEEDED if not isinstance(metrics, dict) or key not in metrics]
     if missing:
         raise DataError(f"{path}: lacks {', '.join(missing)}; run `charnerf evaluate` again.")
     return dict(metrics)

@@ -11,7 +11,7 @@ from charnerf.data.surface import AreaSurface, visible_surface_points
 from charnerf.data.surface_mesh import interpolate
 from charnerf.data.visibility import see_points
 from charnerf.errors import DataError
-from charnerf.evaluation.metrics import F_SCORE_RADIUS_M, surface_distances
+from charnerf.evaluation.metrics import chamfer_of_distances, f_score_of_distances, surface_distances
 from charnerf.types import Cameras
 
 NUM_POINTS = 50_000
@@ -69,11 +69,9 @@ def surface_scores(
     except DataError as error:
         return missing_surface(str(error))
     there, back = surface_distances(points, truth)
-    precision, recall = float((there <= F_SCORE_RADIUS_M).mean()), float((back <= F_SCORE_RADIUS_M).mean())
-    total = precision + recall
     return {
-        "chamfer_mm": float(500.0 * (there.mean() + back.mean())),
-        "f_score": 2.0 * precision * recall / total if total else 0.0,
+        "chamfer_mm": chamfer_of_distances(there, back),
+        "f_score": f_score_of_distances(there, back),
     }, {}
 
 
