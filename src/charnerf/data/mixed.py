@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from charnerf.data.augmentation import AbstractAugmentation
-from charnerf.data.sampler import BatchRequest
+from charnerf.data.sampler import BatchRequest, step_seed
 from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
 from charnerf.errors import DataError
@@ -38,6 +38,7 @@ class MixedDataset(Dataset[TrainBatch]):
         foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white.
         space_points: Labelled points a step, 0 where no loss reads them.
         reads_depth: Whether depth pictures are read.
+        used_views: The model's rule from drawings to views; a hull has maps of all of those.
         augmentation: Changes a batch at random.
         seed: Of the run.
     """
@@ -51,6 +52,7 @@ class MixedDataset(Dataset[TrainBatch]):
         foreground_share: float,
         space_points: int,
         reads_depth: bool,
+        used_views: Callable[[SourceViews], SourceViews],
         augmentation: AbstractAugmentation,
         seed: int,
     ) -> None:
@@ -60,12 +62,13 @@ class MixedDataset(Dataset[TrainBatch]):
         self.foreground_share = foreground_share
         self.space_points = space_points
         self.reads_depth = reads_depth
+        self.used_views = used_views
         self.augmentation = augmentation
         self.seed = seed
 
     def __getitem__(self, request: BatchRequest) -> TrainBatch:  # type: ignore[override]
         """Make the batch of a request; the same request makes the same batch."""
-        generator = torch.Generator().manual_seed((self.seed << 40) + request.step)
+        generator = torch.Generator().manual_seed(step_seed(self.seed, request.step))
         chosen = torch.randperm(len(self.store), generator=generator)[: self.characters]
         opened = [self.store.open(self.store.names[int(index)]) for index in chosen]
         rays = _shares(request.rays, len(opened))
@@ -74,10 +77,11 @@ class MixedDataset(Dataset[TrainBatch]):
         surfaces = [self.surface_of(one) for one in opened]
         surface = _sample_surfaces(surfaces, points, generator) if points else None
         space = self._space(opened, generator)
+        views = stack_views([one.character.sources for one in opened])
         batch = TrainBatch(
             names=tuple(one.character.name for one in opened),
-            views=stack_views([one.character.sources for one in opened]),
-            hull=_stack_hulls(opened),
+            views=views,
+            hull=self._hulls(opened, views),
             rays=RayBundle(
                 origins=torch.stack([d[0].origins for d in drawn]),
                 directions=torch.stack([d[0].directions for d in drawn]),
@@ -92,6 +96,14 @@ class MixedDataset(Dataset[TrainBatch]):
             step=request.step,
         )
         return self.augmentation(batch, generator)
+
+    def _hulls(self, opened: list[OpenCharacter], views: SourceViews) -> Hull | None:
+        """Hulls of the batch, None for a model without."""
+        hulls = [one.hull for one in opened if one.hull is not None]
+        if not hulls or len(opened) == 1:
+            return hulls[0] if hulls else None
+        alone = [self.used_views(one.character.sources) for one in opened]
+        return stack_hulls(hulls, alone, self.used_views(views))
 
     def _rays(
         self, one: OpenCharacter, num_rays: int, generator: torch.Generator
@@ -186,23 +198,27 @@ def _sample_surfaces(
     )
 
 
-def _stack_hulls(opened: list[OpenCharacter]) -> Hull | None:
-    """Hulls of a batch, maps padded to the most views."""
-    hulls = [one.hull for one in opened if one.hull is not None]
-    if not hulls:
-        return None
-    most = max(hull.dilations.shape[1] for hull in hulls)
+def stack_hulls(hulls: list[Hull], alone: list[SourceViews], together: SourceViews) -> Hull:
+    """Hulls of a batch; the maps of each go to the columns that its views have in the batch.
 
-    def padded(tensor: Tensor) -> Tensor:
-        return torch.cat(
-            (tensor, tensor[:, -1:].expand(-1, most - tensor.shape[1], *tensor.shape[2:])), dim=1
-        )
+    Args:
+        hulls: Hulls (1) of characters by themselves, with maps of their views used.
+        alone: Those views, (1, V) each.
+        together: The views used of the batch, (B, V'): the same in the same order, among absent ones.
+    """
+    columns = []
+    for own, present in zip(alone, together.present, strict=True):
+        kept = own.present[0].nonzero()[:, 0]
+        columns.append(kept[(present.cumsum(0) - 1).clamp(0, len(kept) - 1)])
+
+    def placed(name: str) -> Tensor:
+        return torch.stack([getattr(h, name)[0, index] for h, index in zip(hulls, columns, strict=True)])
 
     return Hull(
         occupancy=torch.cat([hull.occupancy for hull in hulls]),
         box_min=torch.cat([hull.box_min for hull in hulls]),
         box_max=torch.cat([hull.box_max for hull in hulls]),
-        front_depths=torch.cat([padded(hull.front_depths) for hull in hulls]),
-        edge_distances=torch.cat([padded(hull.edge_distances) for hull in hulls]),
-        dilations=torch.cat([padded(hull.dilations) for hull in hulls]),
+        front_depths=placed("front_depths"),
+        edge_distances=placed("edge_distances"),
+        dilations=placed("dilations"),
     )

@@ -45,6 +45,11 @@ class BatchRequest:
     loss_weights: Mapping[str, float]
 
 
+def step_seed(seed: int, step: int) -> int:
+    """Seed of everything random in a step of a run; another one for every seed and step below 2^32."""
+    return (seed << 32) + step
+
+
 @final
 class PhaseSampler(Sampler[BatchRequest]):
     """Requests until the next mark of progress or the end of the budget; an epoch is a stretch between two validations.

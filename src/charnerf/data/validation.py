@@ -23,7 +23,7 @@ class ValidationView(TensorRecord):
 
 @final
 class ValidationDataset(Dataset[ValidationView]):
-    """Views spread evenly over the frames of each character.
+    """Views spread evenly over the frames of each character; one with fewer frames shows some again.
 
     Args:
         store: The characters.
@@ -41,7 +41,8 @@ class ValidationDataset(Dataset[ValidationView]):
     def __getitem__(self, index: int) -> ValidationView:
         """Open one picture."""
         one = self.store.open(self.store.names[index // self.views])
-        frame = spread_frames(len(one.images), self.views)[index % self.views]
+        frames = spread_frames(len(one.images), self.views)
+        frame = frames[index % self.views % len(frames)]
         return ValidationView(
             views=one.character.sources,
             hull=one.hull,

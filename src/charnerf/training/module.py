@@ -8,7 +8,7 @@ import lightning as L
 import torch
 from torch import Tensor
 
-from charnerf.data.sampler import Position
+from charnerf.data.sampler import Position, step_seed
 from charnerf.data.validation import ValidationView
 from charnerf.evaluation.metrics import psnr, psnr_foreground, ssim
 from charnerf.losses.total import PassOutput, WeightedLosses
@@ -64,7 +64,7 @@ class TrainingModule(L.LightningModule):
 
     def training_step(self, batch: TrainBatch, batch_idx: int) -> Tensor:
         """Loss of one batch."""
-        generator = torch.Generator().manual_seed((self.seed << 40) + batch.step)
+        generator = torch.Generator().manual_seed(step_seed(self.seed, batch.step))
         encoded = self.model.encode(batch.views, batch.hull)
         scenes = [self.model.scene(encoded, index) for index in range(len(batch.names))]
         renderings = [self.renderer.render(scene, batch.rays[b], generator) for b, scene in enumerate(scenes)]

@@ -89,8 +89,9 @@ def build_data(
             surface_of=surface_of,
             characters=cfg.scale.batch_characters,
             foreground_share=sampling.foreground_share,
-            space_points=sampling.space_points if losses.reads("occupancy") else 0,
-            reads_depth=losses.reads("depth"),
+            space_points=sampling.space_points if reads(cfg, losses, "occupancy") else 0,
+            reads_depth=reads(cfg, losses, "depth"),
+            used_views=model.views,
             augmentation=build_part(cfg.augmentation, {"used_views": model.views}),
             seed=cfg.seed,
         )
@@ -110,13 +111,16 @@ def build_data(
     )
 
 
+def reads(cfg: DictConfig, losses: WeightedLosses, *terms: str) -> bool:
+    """Whether any of these loss terms counts in any phase: what the data must bring."""
+    phases = [phase.get("loss_weights", {}) for phase in cfg.schedule.phases]
+    return any(losses.reads(term) or any(phase.get(term, 0) > 0 for phase in phases) for term in terms)
+
+
 def _surface_of(cfg: DictConfig, losses: WeightedLosses) -> SurfaceOf:
     """A character's surface, opened once; None without a loss that reads it or without a mesh, which is said once."""
     make_surface: Callable[..., Any] = build_part(cfg.surface)
-    phases = cfg.schedule.phases
-    read = any(losses.reads(term) for term in SURFACE_TERMS) or any(
-        phase.get("loss_weights", {}).get(term, 0) > 0 for phase in phases for term in SURFACE_TERMS
-    )
+    read = reads(cfg, losses, *SURFACE_TERMS)
     told: set[str] = set()
 
     @cache
