@@ -145,6 +145,18 @@ FieldFunction = Callable[[Tensor, Tensor], FieldOutput]
 
 
 @dataclass(frozen=True)
+class DensityAnswer:
+    """Densities now, colours on demand: `rgb_of(index (Q,))` gives the colours (Q, 3) of some of the points."""
+
+    densities: Tensor
+    rgb_of: Callable[[Tensor], Tensor]
+
+
+DensityFunction = Callable[[Tensor, Tensor], DensityAnswer]
+"""Answers points (P, 3), m, seen along unit directions (P, 3)."""
+
+
+@dataclass(frozen=True)
 class Scene:
     """One character as renderers and mesh extraction see it: functions of points, not networks.
 
@@ -155,6 +167,7 @@ class Scene:
         box_min: Lower corner of the space looked at, (3,), m.
         box_max: Upper corner, (3,), m.
         density_sees_directions: Whether densities depend on the query direction.
+        densities_first: The finest field in two steps; None where it answers all at once.
     """
 
     coarse: FieldFunction
@@ -163,6 +176,14 @@ class Scene:
     box_min: Tensor
     box_max: Tensor
     density_sees_directions: bool
+    densities_first: DensityFunction | None = None
+
+    def answer_densities(self, points: Tensor, view_dirs: Tensor) -> DensityAnswer:
+        """Densities of the finest field at points (P, 3), its colours on demand; in two steps where it can."""
+        if self.densities_first is not None:
+            return self.densities_first(points, view_dirs)
+        answer = self.field(points, view_dirs)
+        return DensityAnswer(densities=answer.densities, rgb_of=lambda index: answer.rgb[index])
 
     @property
     def field(self) -> FieldFunction:

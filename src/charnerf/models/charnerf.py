@@ -1,6 +1,5 @@
 """The model: drawings -> encoder -> feature maps -> scenes that answer points with colour and density."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import final
@@ -9,16 +8,16 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.errors import ShapeError
-from charnerf.geometry.cameras import directions_to_points, project_into_all
 from charnerf.geometry.encoding import positional_encoding
 from charnerf.geometry.hull import build_hull
 from charnerf.models.encoders.base import AbstractEncoder
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
-from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
+from charnerf.models.lookup import maps_to_rows
+from charnerf.models.view_maps import ViewMaps
 from charnerf.models.views.base import AbstractViews
-from charnerf.types import FieldOutput, Hull, Scene, SourceViews, TensorRecord
+from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
 
 HULL_DEPTH_FADE = 20.0  # per half-extent: a point this share behind the hull's front counts as hidden by 1/e
 
@@ -129,98 +128,56 @@ class CharNeRF(nn.Module):
         hull = encoded.hull[index] if encoded.hull is not None else None
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
-        pictures = _picture_rows(views)
-        depths = None if hull is None else _hull_rows(hull, present)
         answer = partial(
-            self._answer, views=views, map_size=(maps.shape[-1], maps.shape[-2]), pictures=pictures
+            self._inputs,
+            maps=ViewMaps.of(views, hull, present, (maps.shape[-1], maps.shape[-2])),
+            mirrored=views.mirrored.to(maps.dtype),
         )
 
-        def field_of(field: Field) -> Callable[[Tensor, Tensor], FieldOutput]:
-            return partial(answer, field=field, latents=field.hoist(rows), hull_rows=depths)
+        def field_of(field: Field) -> tuple[FieldFunction, DensityFunction]:
+            inputs = partial(answer, latents=field.hoist(rows))
+            return (
+                lambda points, view_dirs: field(inputs(points, view_dirs)),
+                lambda points, view_dirs: field.densities(inputs(points, view_dirs)),
+            )
 
+        coarse, densities = field_of(self.coarse)
+        fine = None
+        if self.fine is not None:
+            fine, densities = field_of(self.fine)
         box_min, box_max = self.box
         return Scene(
-            coarse=field_of(self.coarse),
-            fine=None if self.fine is None else field_of(self.fine),
+            coarse=coarse,
+            fine=fine,
             hull=hull,
             box_min=box_min,
             box_max=box_max,
             density_sees_directions=self.coarse.density.sees_directions,
+            densities_first=densities,
         )
 
-    def _answer(
-        self,
-        points: Tensor,
-        view_dirs: Tensor,
-        *,
-        field: Field,
-        latents: Tensor,
-        views: SourceViews,
-        map_size: tuple[int, int],
-        pictures: Tensor,
-        hull_rows: tuple[Tensor, int, int] | None,
-    ) -> FieldOutput:
-        """Colour and density of points (P, 3) seen along view_dirs (P, 3)."""
-        num_points, num_views = points.shape[0], views.present.shape[0]
-        cameras = views.cameras
-        pixels, depth, in_front = project_into_all(cameras, points)
-        size = pixels.new_tensor((cameras.width, cameras.height))
-        valid = in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)
-        read = partial(bilinear_rows, width=map_size[0], height=map_size[1])
-        read_latents = read_rows(latents, *read(pixels * (pixels.new_tensor(map_size) / size)))
-        source_rgb = read_rows(pictures, *bilinear_rows(pixels, width=cameras.width, height=cameras.height))
-        source_rgb = source_rgb.unflatten(0, (num_points, num_views))
-        source_dirs = directions_to_points(cameras, points)
-        behind, edge = self._read_hull(hull_rows, cameras, pixels / size, depth, points)
+    def _inputs(
+        self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor
+    ) -> PointInputs:
+        """What a field sees of points (P, 3) looked at along view_dirs (P, 3)."""
+        sight = maps.look(points, latents)
+        if sight.front is None or sight.edge is None:
+            behind = edge = torch.zeros_like(sight.along_ray)
+        else:
+            behind = (sight.along_ray - sight.front) / self.box_half_extent
+            edge = sight.edge / maps.cameras.width
         readings = ViewReadings(
-            source_rgb=source_rgb,
-            behind=behind,
-            edge=edge,
-            source_dirs=source_dirs,
-            mirrored=views.mirrored.to(points.dtype),
+            source_rgb=sight.rgb, behind=behind, edge=edge, source_dirs=sight.source_dirs, mirrored=mirrored
         )
-        inputs = PointInputs(
-            latents=read_latents.unflatten(0, (num_points, num_views)) * valid[..., None],
+        return PointInputs(
+            latents=sight.latents,
             extras=self.features(readings),
-            source_rgb=source_rgb,
+            source_rgb=sight.rgb,
             visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
-            valid=valid,
+            valid=sight.valid,
             encoded_points=positional_encoding(
                 (points - self.box_centre) / self.box_half_extent, self.num_frequencies
             ),
             view_dirs=view_dirs,
-            source_dirs=source_dirs,
+            source_dirs=sight.source_dirs,
         )
-        return field(inputs)
-
-    def _read_hull(
-        self,
-        hull_rows: tuple[Tensor, int, int] | None,
-        cameras: object,
-        shares: Tensor,
-        depth: Tensor,
-        points: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        """Distance behind the hull's front, in half-extents, and distance from the mask's edge, in picture sides, (P, V) each."""
-        if hull_rows is None:
-            return torch.zeros_like(depth), torch.zeros_like(depth)
-        rows, width, height = hull_rows
-        read = read_rows(
-            rows, *bilinear_rows(shares * shares.new_tensor((width, height)), width=width, height=height)
-        )
-        front, edge = read.unflatten(0, depth.shape).unbind(-1)
-        centres = cameras.world_from_camera[:, :3, 3]  # type: ignore[attr-defined]
-        along_ray = torch.where(cameras.orthographic, depth, (points[:, None] - centres).norm(dim=-1))  # type: ignore[attr-defined]
-        return (along_ray - front) / self.box_half_extent, edge / cameras.width  # type: ignore[attr-defined]
-
-
-def _picture_rows(views: SourceViews) -> Tensor:
-    """Colours of the drawings on white as rows (V * H * W, 3)."""
-    rgb, alpha = views.images[:, :3], views.images[:, 3:]
-    return maps_to_rows(rgb * alpha + (1.0 - alpha))
-
-
-def _hull_rows(hull: Hull, present: Tensor) -> tuple[Tensor, int, int]:
-    """Front depths and edge distances of the present views as rows (V * h * w, 2), with the maps' width and height."""
-    maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
-    return maps_to_rows(maps), maps.shape[-1], maps.shape[-2]

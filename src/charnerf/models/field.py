@@ -9,7 +9,7 @@ from charnerf.models.density.base import AbstractDensity
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.inputs import PointInputs
 from charnerf.models.stages import MultiView, SingleView
-from charnerf.types import FieldOutput
+from charnerf.types import DensityAnswer, FieldOutput
 
 
 @final
@@ -61,6 +61,16 @@ class Field(nn.Module):
         trunk = self.density(inputs, self.single_view, self.combinator, self.multi_view)
         rgb = self.head(trunk.features, trunk.view_features, inputs)
         return FieldOutput(rgb=rgb, densities=self.activation(trunk.raw_densities))
+
+    def densities(self, inputs: PointInputs) -> DensityAnswer:
+        """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps."""
+        trunk = self.density.trunk(inputs, self.single_view, self.combinator, self.multi_view)
+
+        def rgb_of(index: Tensor) -> Tensor:
+            some, seen = trunk[index], inputs[index]
+            return self.head(self.density.directed(some, seen, self.combinator), some.view_features, seen)
+
+        return DensityAnswer(densities=self.activation(trunk.raw_densities), rgb_of=rgb_of)
 
     def hoist(self, rows: Tensor) -> Tensor:
         """Apply the linear layer of the features to the maps' rows (N, F) -> (N, D), once instead of at every point.

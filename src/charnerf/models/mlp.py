@@ -21,7 +21,7 @@ class ResidualBlock(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Apply the block to (..., width)."""
-        return x + self.second(F.relu(self.first(F.relu(x))))
+        return x + self.second(self.first(F.relu(x)).relu_())
 
 
 def residual_blocks(*, width: int, num_blocks: int) -> nn.Sequential:

@@ -2,7 +2,6 @@
 
 from typing import final
 
-import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -37,12 +36,15 @@ class SingleView(nn.Module):
         self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
 
     def forward(self, inputs: PointInputs, view_dirs: Tensor) -> Tensor:
-        """V^(i) (P, V, D) of points seen along view_dirs (P, 3)."""
-        located = torch.cat((inputs.encoded_points, encode_directions(view_dirs)), dim=-1)
-        x = inputs.latents + self.from_points(located)[:, None]
-        if self.from_extras is not None:
-            x = x + self.from_extras(inputs.extras)
-        return self.blocks(x)
+        """V^(i) (P, V, D) of points seen along view_dirs (P, 3), or (1, 3) for all."""
+        size = inputs.encoded_points.shape[-1]
+        weight = self.from_points.weight
+        # one direction for all points costs one row, not one a point
+        located = F.linear(inputs.encoded_points, weight[:, :size]) + F.linear(
+            encode_directions(view_dirs), weight[:, size:], self.from_points.bias
+        )
+        x = inputs.latents + located[:, None]
+        return self.blocks(x if self.from_extras is None else x.add_(self.from_extras(inputs.extras)))
 
 
 @final

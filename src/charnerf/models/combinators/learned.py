@@ -4,9 +4,8 @@ from typing import final
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
-from charnerf.models.combinators.base import AbstractCombinator, masked_logits
+from charnerf.models.combinators.base import AbstractCombinator, masked_logits, weighted_sum
 
 
 @final
@@ -32,6 +31,6 @@ class LearnedWeights(AbstractCombinator):
         """Fuse (P, V, D) to (P, D)."""
         cosines = (view_dirs[:, None] * source_dirs).sum(-1, keepdim=True)
         angles = self.from_angles(torch.cat((cosines, source_dirs), dim=-1))
-        logits = self.score(F.relu(self.from_features(view_features) + angles))[..., 0]
+        logits = self.score(self.from_features(view_features).add_(angles).relu_())[..., 0]
         weights = torch.softmax(masked_logits(logits, valid), dim=-1)
-        return (view_features * weights[..., None]).sum(1)
+        return weighted_sum(weights, view_features)

@@ -4,7 +4,7 @@ from typing import final
 
 from torch import Tensor
 
-from charnerf.models.combinators.base import AbstractCombinator, view_weights
+from charnerf.models.combinators.base import AbstractCombinator, view_weights, weighted_sum
 
 
 @final
@@ -15,4 +15,4 @@ class Mean(AbstractCombinator):
 
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
         """Average (P, V, D) to (P, D)."""
-        return (view_features * view_weights(valid, view_features.dtype)[..., None]).sum(1)
+        return weighted_sum(view_weights(valid, view_features.dtype), view_features)

@@ -1,17 +1,18 @@
 """How the query direction enters: the wiring of f1, H and f2."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.inputs import PointInputs
 from charnerf.models.stages import MultiView, SingleView
+from charnerf.types import TensorRecord
 
 
 @dataclass(frozen=True)
-class TrunkOutput:
+class TrunkOutput(TensorRecord):
     """raw densities (P,), features for the colour head (P, D) and per-view features (P, V, D)."""
 
     raw_densities: Tensor
@@ -29,6 +30,19 @@ class AbstractDensity(nn.Module, ABC):
     sees_directions: bool
 
     @abstractmethod
+    def trunk(
+        self,
+        inputs: PointInputs,
+        single_view: SingleView,
+        combinator: AbstractCombinator,
+        multi_view: MultiView,
+    ) -> TrunkOutput:
+        """Run what the densities of points (P) need; features are those before `directed`."""
+
+    @abstractmethod
+    def directed(self, trunk: TrunkOutput, inputs: PointInputs, combinator: AbstractCombinator) -> Tensor:
+        """Features (P, D) for the colour head, with the query direction in them; needed only where colours are."""
+
     def forward(
         self,
         inputs: PointInputs,
@@ -36,4 +50,6 @@ class AbstractDensity(nn.Module, ABC):
         combinator: AbstractCombinator,
         multi_view: MultiView,
     ) -> TrunkOutput:
-        """Run the trunk for points (P)."""
+        """Run the trunk for points (P), features directed."""
+        trunk = self.trunk(inputs, single_view, combinator, multi_view)
+        return replace(trunk, features=self.directed(trunk, inputs, combinator))

@@ -2,6 +2,8 @@
 
 from typing import final
 
+from torch import Tensor
+
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
 from charnerf.models.inputs import PointInputs
@@ -21,7 +23,7 @@ class ViewDependentDensity(AbstractDensity):
     def __init__(self, *, width: int) -> None:
         super().__init__()
 
-    def forward(
+    def trunk(
         self,
         inputs: PointInputs,
         single_view: SingleView,
@@ -33,3 +35,7 @@ class ViewDependentDensity(AbstractDensity):
         fused = combinator(view_features, inputs.view_dirs, inputs.source_dirs, inputs.valid)
         features, raw = multi_view(fused, inputs.view_dirs)
         return TrunkOutput(raw_densities=raw, features=features, view_features=view_features)
+
+    def directed(self, trunk: TrunkOutput, inputs: PointInputs, combinator: AbstractCombinator) -> Tensor:
+        """The trunk's features: they have the direction already."""
+        return trunk.features

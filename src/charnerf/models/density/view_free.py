@@ -3,7 +3,7 @@
 from typing import final
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
@@ -27,21 +27,25 @@ class ViewFreeDensity(AbstractDensity):
         self.from_dirs = nn.Linear(6 * DIRECTION_FREQUENCIES, width)
         self.colour = ResidualBlock(width=width)
 
-    def forward(
+    def trunk(
         self,
         inputs: PointInputs,
         single_view: SingleView,
         combinator: AbstractCombinator,
         multi_view: MultiView,
     ) -> TrunkOutput:
-        """Run the trunk without a direction, then the colour block with it."""
-        no_direction = torch.zeros_like(inputs.view_dirs)
+        """Run the trunk without a direction; the zero direction is one row for all points."""
+        no_direction = torch.zeros_like(inputs.view_dirs[:1])
         view_features = single_view(inputs, no_direction)
         fused = combinator(view_features, no_direction, inputs.source_dirs, inputs.valid)
         features, raw = multi_view(fused, no_direction)
-        directed = features + self.from_dirs(encode_directions(inputs.view_dirs))
+        return TrunkOutput(raw_densities=raw, features=features, view_features=view_features)
+
+    def directed(self, trunk: TrunkOutput, inputs: PointInputs, combinator: AbstractCombinator) -> Tensor:
+        """The colour block: the trunk's features, the direction, and what the combinator answers to it."""
+        directed = trunk.features + self.from_dirs(encode_directions(inputs.view_dirs))
         if combinator.sees_query:
             directed = directed + combinator(
-                view_features, inputs.view_dirs, inputs.source_dirs, inputs.valid
+                trunk.view_features, inputs.view_dirs, inputs.source_dirs, inputs.valid
             )
-        return TrunkOutput(raw_densities=raw, features=self.colour(directed), view_features=view_features)
+        return self.colour(directed)

@@ -34,12 +34,9 @@ class BlendHead(AbstractHead):
         """Colours (P, 3)."""
         cosines = (inputs.view_dirs[:, None] * inputs.source_dirs).sum(-1, keepdim=True)
         readings = torch.cat((cosines, inputs.visibility[..., None], inputs.source_rgb), dim=-1)
-        hidden = (
-            self.from_views(view_features)
-            + self.from_features(features)[:, None]
-            + self.from_readings(readings)
-        )
-        logits = self.score(F.relu(hidden))[..., 0] + 2.0 * inputs.visibility
+        hidden = self.from_views(view_features) + self.from_features(features)[:, None]
+        hidden = hidden.add_(self.from_readings(readings)).relu_()
+        logits = self.score(hidden)[..., 0] + 2.0 * inputs.visibility
         weights = torch.softmax(masked_logits(logits, inputs.valid), dim=-1)
         blended = (weights[..., None] * inputs.source_rgb).sum(1)
         free = self.free(F.relu(features))

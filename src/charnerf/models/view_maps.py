@@ -1,0 +1,134 @@
+"""All that a character's views show, prepared once as rows, and read at points.
+
+Letters: P points, V views, C channels. Everything that does not depend on the point (camera matrices, drawings on white, maps of
+the hull) is computed here once a character instead of once a sample.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from charnerf.geometry.cameras import directions_to_points, project_into_all
+from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
+from charnerf.types import Cameras, Hull, SourceViews
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Points (P) as the views (V) see them, without the encoder's features.
+
+    Attributes:
+        latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
+        rgb: (P, V, 3), colour of the drawings.
+        front: (P, V), m, distance of the hull's front along the view's ray.
+        edge: (P, V), pixels, distance from the mask's edge.
+        along_ray: (P, V), m, distance of the point along the view's ray.
+        source_dirs: (P, V, 3), unit.
+        valid: (P, V), bool.
+    """
+
+    latents: Tensor
+    rgb: Tensor
+    front: Tensor | None
+    edge: Tensor | None
+    along_ray: Tensor
+    source_dirs: Tensor
+    valid: Tensor
+
+
+@dataclass(frozen=True)
+class ViewMaps:
+    """Drawings and hull maps of one character as rows, with its cameras.
+
+    Attributes:
+        cameras: (V,).
+        parallel: Whether every camera is orthographic: no perspective division, one direction a view.
+        map_size: Width and height of the feature maps.
+        pictures: Rows (V * H * W, 3), or (V * H * W, 5) where the hull's maps have the pictures' size and lie beside the colours.
+        hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None without a hull or where
+            they lie beside the colours.
+        hull_size: Width and height of the hull's maps.
+    """
+
+    cameras: Cameras
+    parallel: bool
+    map_size: tuple[int, int]
+    pictures: Tensor
+    hull_rows: Tensor | None
+    hull_size: tuple[int, int]
+
+    @classmethod
+    def of(
+        cls, views: SourceViews, hull: Hull | None, present: Tensor, map_size: tuple[int, int]
+    ) -> "ViewMaps":
+        """Prepare present views (V, ...) and the maps that their hull keeps of them.
+
+        Args:
+            views: Views (V,), absent ones dropped.
+            hull: The character's hull with maps of all views, or None.
+            present: Indices of the views in the hull's maps, (V,).
+            map_size: Width and height of the feature maps.
+        """
+        rgb, alpha = views.images[:, :3], views.images[:, 3:]
+        pictures, rows, size = rgb * alpha + (1.0 - alpha), None, (0, 0)
+        if hull is not None:
+            maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
+            size = (maps.shape[-1], maps.shape[-2])
+            if maps.shape[-2:] == pictures.shape[-2:]:
+                pictures = torch.cat((pictures, maps.to(pictures.dtype)), dim=1)
+            else:
+                rows = maps_to_rows(maps)
+        return cls(
+            cameras=views.cameras,
+            parallel=bool(views.cameras.orthographic.all()),
+            map_size=map_size,
+            pictures=maps_to_rows(pictures),
+            hull_rows=rows,
+            hull_size=size,
+        )
+
+    def look(self, points: Tensor, latents: Tensor) -> Sight:
+        """Read features (rows (V * h * w, D)), drawings and hull maps at points (P, 3)."""
+        cameras, leading = self.cameras, (points.shape[0], self.cameras.shape[0])
+        pixels, depth, in_front = project_into_all(cameras, points)
+        size = pixels.new_tensor((cameras.width, cameras.height))
+        valid = in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)
+        scale = pixels.new_tensor(self.map_size) / size
+        indices, weights = bilinear_rows(pixels * scale, width=self.map_size[0], height=self.map_size[1])
+        read = read_rows(latents, indices, weights * valid.reshape(-1, 1))
+        seen = read_rows(
+            self.pictures, *bilinear_rows(pixels, width=cameras.width, height=cameras.height)
+        ).unflatten(0, leading)
+        front, edge = self._hull_readings(pixels / size, seen)
+        directions, along_ray = self._directions(points, depth)
+        return Sight(
+            latents=read.unflatten(0, leading),
+            rgb=seen[..., :3],
+            front=front,
+            edge=edge,
+            along_ray=along_ray,
+            source_dirs=directions,
+            valid=valid,
+        )
+
+    def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
+        """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
+        if seen.shape[-1] > 3:
+            return seen[..., 3], seen[..., 4]
+        if self.hull_rows is None:
+            return None, None
+        width, height = self.hull_size
+        own = bilinear_rows(shares * shares.new_tensor(self.hull_size), width=width, height=height)
+        front, edge = read_rows(self.hull_rows, *own).unflatten(0, seen.shape[:2]).unbind(-1)
+        return front, edge
+
+    def _directions(self, points: Tensor, depth: Tensor) -> tuple[Tensor, Tensor]:
+        """Unit directions (P, V, 3) from the cameras to points, and distances along their rays (P, V)."""
+        if self.parallel:
+            axes = -self.cameras.world_from_camera[:, :3, 2]
+            return axes.expand(points.shape[0], -1, -1), depth
+        centres = self.cameras.world_from_camera[:, :3, 3]
+        distance = (points[:, None] - centres).norm(dim=-1)
+        along = torch.where(self.cameras.orthographic, depth, distance)
+        return directions_to_points(self.cameras, points), along
