@@ -1,0 +1,75 @@
+"""Which batch comes next: exact counts at exact batches, whatever the epochs and resumes between."""
+
+import pytest
+
+from charnerf.data.sampler import BatchRequest, PhaseSampler, RunPosition, step_seed
+from charnerf.schedule import Phase, PhaseSchedule
+
+LONG = 10
+
+
+class Run:
+    """A run of LONG steps that stands where it is told."""
+
+    def __init__(self, step: int = 0) -> None:
+        self.step = step
+
+    def __call__(self) -> RunPosition:
+        return RunPosition(step=self.step, seconds=0.5 * self.step, progress=self.step / LONG)
+
+
+def schedule(until: dict[str, float]) -> PhaseSchedule:
+    few = Phase(rays=10, surface_points=30, until=until)
+    many = Phase(rays=100, surface_points=0, loss_weights={"opacity": 0.5})
+    return PhaseSchedule(phases=[few, many])
+
+
+def epochs(run: Run, sampler: PhaseSampler, *, stop_at: int = LONG) -> list[list[BatchRequest]]:
+    """Train as the trainer does: one request, one step, until the budget or a stop."""
+    done: list[list[BatchRequest]] = []
+    while run.step < min(stop_at, LONG):
+        done.append([])
+        for request in sampler:
+            done[-1].append(request)
+            run.step += 1
+            if run.step >= stop_at:
+                break
+    return done
+
+
+@pytest.mark.parametrize("until", [{"steps": 4}, {"share": 0.4}, {"seconds": 2.0}])
+@pytest.mark.parametrize("num_marks", [1, 2, 3, 10])
+def test_counts_change_at_the_exact_batch(until, num_marks):
+    run = Run()
+    done = epochs(run, PhaseSampler(schedule=schedule(until), position=run, num_marks=num_marks))
+    requests = [request for epoch in done for request in epoch]
+    assert [request.step for request in requests] == list(range(LONG))
+    assert [request.rays for request in requests] == [10] * 4 + [100] * 6
+    assert [request.surface_points for request in requests] == [30] * 4 + [0] * 6
+    assert [request.phase for request in requests] == [0] * 4 + [1] * 6
+    assert [dict(request.loss_weights) for request in requests] == [{}] * 4 + [{"opacity": 0.5}] * 6
+    assert len(done) == num_marks and all(done)
+
+
+@pytest.mark.parametrize("stop_at", [2, 3, 4, 5, 7])
+def test_a_resume_asks_for_the_same_batches(stop_at):
+    straight, whole = Run(), schedule({"steps": 4})
+    expected = epochs(straight, PhaseSampler(schedule=whole, position=straight, num_marks=2))
+    first = Run()
+    before = epochs(first, PhaseSampler(schedule=whole, position=first, num_marks=2), stop_at=stop_at)
+    second = Run(stop_at)
+    after = epochs(second, PhaseSampler(schedule=whole, position=second, num_marks=2))
+    flat = lambda done: [request for epoch in done for request in epoch]  # noqa: E731
+    assert flat(before) + flat(after) == flat(expected)
+
+
+def test_an_epoch_ends_at_a_mark_and_a_used_up_budget_gives_none():
+    run = Run()
+    done = epochs(run, PhaseSampler(schedule=schedule({"steps": 4}), position=run, num_marks=4))
+    assert [len(epoch) for epoch in done] == [3, 2, 3, 2]  # marks at 2.5, 5, 7.5, 10 steps
+    assert list(PhaseSampler(schedule=schedule({"steps": 4}), position=Run(LONG), num_marks=4)) == []
+
+
+def test_every_step_of_every_run_has_its_seed():
+    seeds = {step_seed(seed, step) for seed in (0, 1, 7, 20240229, 2**32 - 1) for step in (0, 1, 5, 400_000)}
+    assert len(seeds) == 20 and max(seeds) < 2**64
