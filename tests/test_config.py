@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from hydra.utils import get_object
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 
 from charnerf import runs
 from charnerf.config import validate, validate_model
@@ -117,12 +117,13 @@ def test_an_unknown_key_is_refused_however_it_is_added(override: str) -> None:
     assert message.startswith("typo: unknown key; expected one of: ")
 
 
-@pytest.mark.parametrize(
-    "section",
-    ["model", "scale", "budget", "sampling", "combinator", "loss", "schedule", "renderer", "data", "surface"],
-)
-def test_an_unknown_key_is_refused_in_every_section(section: str) -> None:
-    assert problem(f"+{section}.zzz=1").startswith(f"{section}.zzz: ")
+def test_an_unknown_key_is_refused_in_every_section() -> None:
+    cfg = compose_config(["scale=smoke"])
+    sections = [str(key) for key in cfg if isinstance(cfg[key], DictConfig)]
+    assert len(sections) > 15
+    message = problem(*(f"+{section}.zzz=1" for section in sections))
+    named = {line.strip().split(":")[0] for line in message.splitlines()[1:]}
+    assert named == {f"{section}.zzz" for section in sections}
 
 
 def test_wrong_types_are_named() -> None:

@@ -161,7 +161,10 @@ def evaluate(
     data: Dataset,
     weights: Weights = None,
     split: Annotated[str, typer.Option(metavar="NAME", help="Split to measure on.")] = "test",
-    views: Annotated[str, typer.Option(metavar="N|all", help="Fixed views a character.")] = "24",
+    views: Annotated[
+        str | None,
+        typer.Option(metavar="N|all", help="Fixed views a character; as many as in training if left out."),
+    ] = None,
     json_file: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", dir_okay=False, help="Write the metrics there as well."),

@@ -110,7 +110,7 @@ def evaluate(
     data: Path,
     *,
     split: str,
-    views: str,
+    views: str | None,
     json_file: Path | None,
     output: Path | None,
     renderer: str | None,
@@ -120,9 +120,11 @@ def evaluate(
     trust: Sequence[str],
 ) -> None:
     """Measure a model on a split and print the metrics as JSON."""
-    if views != "all" and not (views.isdigit() and int(views) >= 1):
+    if views not in (None, "all") and not (views.isdigit() and int(views) >= 1):
         raise ConfigError(f"--views: found '{views}', expected a number from 1 on, or all.")
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
+    if views is None:
+        views = str(model.config.scale.eval_views or "all")
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
     metrics = evaluate_split(
