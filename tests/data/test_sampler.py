@@ -1,6 +1,7 @@
 """Which batch comes next: exact counts at exact batches, whatever the epochs and resumes between."""
 
 import pytest
+import torch
 
 from charnerf.data.sampler import BatchRequest, PhaseSampler, RunPosition, step_seed
 from charnerf.schedule import Phase, PhaseSchedule
@@ -71,5 +72,10 @@ def test_an_epoch_ends_at_a_mark_and_a_used_up_budget_gives_none():
 
 
 def test_every_step_of_every_run_has_its_seed():
-    seeds = {step_seed(seed, step) for seed in (0, 1, 7, 20240229, 2**32 - 1) for step in (0, 1, 5, 400_000)}
-    assert len(seeds) == 20 and max(seeds) < 2**64
+    """Torch's generator reads 32 bits of a seed: a run's seed in the bits above would change nothing."""
+    runs, steps = (0, 1, 7, 20240229, 2**32 - 1), (0, 1, 5, 400_000)
+    seeds = {step_seed(seed, step) for seed in runs for step in steps}
+    assert len(seeds) == 20 and all(0 <= seed < 2**32 for seed in seeds)
+    draws = {torch.rand(1, generator=torch.Generator().manual_seed(seed)).item() for seed in seeds}
+    assert len(draws) == 20
+    assert len({step_seed(0, step) for step in range(10_000)}) >= 9_999

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, final
 
+import numpy as np
 from torch.utils.data import Sampler
 
 from charnerf.schedule import PhaseSchedule
@@ -46,8 +47,8 @@ class BatchRequest:
 
 
 def step_seed(seed: int, step: int) -> int:
-    """Seed of everything random in a step of a run; another one for every seed and step below 2^32."""
-    return (seed << 32) + step
+    """Seed of everything random in a step of a run, hashed to 32 bits: torch's CPU generator drops all bits above."""
+    return int(np.random.SeedSequence((seed, step)).generate_state(1)[0])
 
 
 @final

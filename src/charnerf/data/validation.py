@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import final
 
-import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
@@ -52,7 +51,7 @@ class ValidationDataset(Dataset[ValidationView]):
 
 
 def spread_frames(num_frames: int, wanted: int) -> list[int]:
-    """Evenly chosen indices of frames; all of them where fewer exist than are wanted."""
+    """Evenly chosen distinct indices of frames; all of them where fewer exist than are wanted."""
     if wanted >= num_frames:
         return list(range(num_frames))
-    return torch.linspace(0, num_frames - 1, wanted + 2)[1:-1].round().long().tolist()
+    return [(index + 1) * num_frames // (wanted + 1) for index in range(wanted)]

@@ -1,0 +1,200 @@
+"""Training batches: repeatable, coloured and placed as the pictures say, nothing read in vain."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+import helpers
+from charnerf.data.augmentation import NoAugmentation
+from charnerf.data.mixed import MixedDataset, stack_views
+from charnerf.data.sampler import BatchRequest
+from charnerf.data.store import CharacterStore
+from charnerf.data.surface import AreaSurface, load_surface_mesh
+from charnerf.data.validation import ValidationDataset, spread_frames
+from charnerf.errors import DataError
+from charnerf.geometry.cameras import project
+from charnerf.geometry.hull import build_hull
+from charnerf.models.views.turnaround import Turnaround
+from charnerf.types import SourceViews, TrainBatch
+
+NAMES = ("lefty", "mirror")
+FIGURES = {"lefty": helpers.person(symmetric=False), "mirror": helpers.person()}
+
+
+def carve(views: SourceViews):
+    low = torch.tensor((-1.8, -1.8, -0.8))
+    return build_hull(views, box_min=low, box_max=low + 3.6, grid_size=32)
+
+
+def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 64.0) -> CharacterStore:
+    return CharacterStore(
+        root=root, names=names, carve=carve if hull else lambda _: None, memory_mib=memory_mib
+    )
+
+
+def surface_of(one):
+    return (
+        None if one.character.mesh_file is None else AreaSurface(load_surface_mesh(one.character.mesh_file))
+    )
+
+
+def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
+    settings = {
+        "surface_of": lambda one: None, "characters": 1, "foreground_share": 0.75, "space_points": 0,
+        "reads_depth": False, "used_views": Turnaround(), "augmentation": NoAugmentation(), "seed": 5,
+    }  # fmt: skip
+    return MixedDataset(store=store, **settings | changes)
+
+
+def request(step: int = 0, *, rays: int = 64, surface_points: int = 0, **more) -> BatchRequest:
+    made = BatchRequest(step=step, rays=rays, surface_points=surface_points, phase=0, loss_weights={})
+    return replace(made, **more)
+
+
+@pytest.fixture(scope="module")
+def store(figure_dataset) -> CharacterStore:
+    return store_of(figure_dataset)
+
+
+def same(one: TrainBatch, other: TrainBatch) -> bool:
+    return one.names == other.names and all(
+        torch.equal(a, b)
+        for a, b in (
+            (one.rays.origins, other.rays.origins),
+            (one.rays.directions, other.rays.directions),
+            (one.rgb, other.rgb),
+            (one.surface.points, other.surface.points),
+            (one.space.points, other.space.points),
+        )
+    )
+
+
+def test_the_same_request_makes_the_same_batch(figure_dataset, store):
+    """Also in another process's data set, in any order; another step or seed makes another one."""
+    settings = {"surface_of": surface_of, "space_points": 20}
+    dataset = dataset_of(store, **settings)
+    asked = request(3, surface_points=30)
+    first = dataset[asked]
+    dataset[request(9, surface_points=30)]
+    assert same(dataset[asked], first)
+    assert same(dataset_of(store_of(figure_dataset), **settings)[asked], first)
+    assert not same(dataset[request(4, surface_points=30)], first)
+    assert not same(dataset_of(store, **settings, seed=6)[asked], first)
+    assert dataset_of(store, **settings, seed=2**32 - 1)[asked].rgb.isfinite().all()
+
+
+def test_rays_carry_the_colours_that_the_figure_has(store):
+    """Each ray traced through the figure in closed form: on white, away from antialiased edges."""
+    batch = dataset_of(store, characters=2)[request(rays=600)]
+    assert set(batch.names) == set(NAMES) and batch.rgb.shape == (2, 300, 3)
+    torch.testing.assert_close(batch.rays.directions.norm(dim=-1), torch.ones(2, 300))
+    for b, name in enumerate(batch.names):
+        t_vals, colors = helpers.trace(FIGURES[name], batch.rays[b])
+        hit = t_vals.isfinite()
+        solid, empty = hit & (batch.alpha[b] == 1), ~hit & (batch.alpha[b] == 0)
+        right = (batch.rgb[b] - colors.float()).abs().amax(-1) < 0.01
+        assert right[solid].float().mean() > 0.7  # others lie on a border between two colours
+        assert batch.rgb[b][empty].eq(1).all()
+        assert (solid | empty).float().mean() > 0.5
+        assert not (hit & (batch.alpha[b] == 0)).any() and not (~hit & (batch.alpha[b] == 1)).any()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_the_share_of_foreground_is_kept(store, share):
+    """At least so many rays show the character; the rest falls anywhere."""
+    batch = dataset_of(store, foreground_share=share)[request(rays=4000)]
+    one = store.open(batch.names[0])
+    covered = len(one.foreground) / one.images[..., 0].numel()
+    expected = share + (1.0 - share) * covered
+    assert (batch.alpha > 0).float().mean().item() == pytest.approx(expected, abs=0.03)
+    assert share < 1.0 or (batch.alpha > 0).all()
+
+
+def test_depth_is_along_the_ray(store):
+    batch = dataset_of(store, reads_depth=True)[request(rays=500)]
+    t_vals, _ = helpers.trace(FIGURES[batch.names[0]], batch.rays[0])
+    hit = t_vals.isfinite()
+    torch.testing.assert_close(batch.depth[0][hit], t_vals[hit].float(), atol=1.5e-3, rtol=0)
+    assert batch.depth[0][~hit].eq(0).all()
+    assert dataset_of(store)[request()].depth is None
+
+
+def test_surface_points_lie_on_every_characters_surface(store):
+    batch = dataset_of(store, surface_of=surface_of, characters=2)[request(surface_points=200)]
+    assert batch.surface.points.shape == (2, 100, 3)
+    for b, name in enumerate(batch.names):
+        assert helpers.signed_distances(FIGURES[name], batch.surface.points[b]).max() < 0.01
+    none = dataset_of(store, surface_of=surface_of)[request(surface_points=0)]
+    assert none.surface is None
+
+
+def test_counts_are_of_all_characters_together(store):
+    for characters in (1, 2, 5):
+        batch = dataset_of(store, characters=characters, space_points=40)[request(rays=100)]
+        used = min(characters, 2)
+        assert len(batch.names) == len(set(batch.names)) == used
+        assert batch.alpha.numel() == 100 and batch.space.points.shape == (used, 40 // used, 3)
+        assert batch.hull.occupancy.shape[0] == used == batch.views.present.shape[0]
+
+
+def test_every_character_gets_its_turn(store):
+    dataset = dataset_of(store)
+    names = [dataset[request(step, rays=4)].names[0] for step in range(40)]
+    assert 8 <= names.count("lefty") <= 32
+
+
+def test_a_character_without_a_mesh_makes_a_batch_of_rays(tmp_path):
+    helpers.write_figure(tmp_path, "bare", "train", helpers.ball(), views=2, mesh=False)
+    store = store_of(tmp_path, names=("bare",))
+    batch = dataset_of(store, surface_of=surface_of)[request(surface_points=30)]
+    assert batch.surface is None and batch.alpha.numel() == 64
+
+
+def test_labelled_points_need_a_hull(figure_dataset):
+    store = store_of(figure_dataset, hull=False)
+    assert dataset_of(store)[request()].hull is None
+    with pytest.raises(DataError, match=r"loss\.weights\.occupancy: .* with model\.hull=false"):
+        dataset_of(store, space_points=8)[request()]
+
+
+def test_padded_views_are_absent():
+    views = [helpers.source_views(helpers.ball(), helpers.source_cameras(a)) for a in ((0.0, 90.0), (180.0,))]
+    batch = stack_views(views)
+    assert batch.present.tolist() == [[True, True], [True, False]]
+    assert torch.equal(batch.images[1, 0], views[1].images[0, 0])
+    point = torch.tensor((0.2, 0.1, 1.3))
+    for b, view in ((0, 1), (1, 0)):
+        expected = project(views[b].cameras[0, view], point)[0]
+        assert torch.equal(project(batch.cameras[b, view], point)[0], expected)
+
+
+def test_the_store_drops_what_was_not_used_for_longest(figure_dataset):
+    roomy, tight = store_of(figure_dataset), store_of(figure_dataset, memory_mib=0.001)
+    assert roomy.open("lefty") is roomy.open("lefty")
+    first = tight.open("lefty")
+    tight.open("mirror")
+    assert tight.open("mirror") is tight.open("mirror")
+    again = tight.open("lefty")
+    assert again is not first and torch.equal(again.images, first.images)
+
+
+def test_validation_shows_each_characters_views(figure_dataset):
+    views = ValidationDataset(store=store_of(figure_dataset, names=("lefty", "rods")), views=5)
+    assert len(views) == 10  # `rods` has three frames only: two of them are shown again
+    shown = [views[index] for index in range(10)]
+    poses = [view.camera.world_from_camera for view in shown]
+    assert len({tuple(pose.reshape(-1).tolist()) for pose in poses[:5]}) == 5
+    assert len({tuple(pose.reshape(-1).tolist()) for pose in poses[5:]}) == 3
+    truth = helpers.photograph(FIGURES["lefty"], shown[0].camera[None])[0]
+    torch.testing.assert_close(shown[0].rgba[..., 3], truth[..., 3], atol=0.003, rtol=0)
+
+
+def test_frames_are_spread():
+    assert (
+        spread_frames(10, 3) == [2, 5, 7]
+        and spread_frames(3, 3) == [0, 1, 2]
+        and spread_frames(2, 5) == [0, 1]
+    )
+    assert all(len(set(spread_frames(n, k))) == k for n in range(1, 40) for k in range(1, n + 1))
