@@ -13,6 +13,7 @@ from skimage.measure import marching_cubes
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.meshing.density_grid import DensityGrid
+from charnerf.meshing.manifold import make_manifold
 
 KEPT_SHARE = 0.01  # of the largest part's area: a part as large as this is kept wherever it is
 KEPT_SPECK = 0.0005  # of the largest part's area: a smaller part is dropped wherever it is
@@ -172,10 +173,9 @@ def simplify(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     if len(mesh.faces) <= faces:
         return mesh
     points, triangles = fast_simplification.simplify(
-        np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), target_count=faces
+        np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), target_count=faces, agg=5
     )[:2]
-    result = trimesh.Trimesh(np.asarray(points, np.float64), triangles, process=False)
-    result.remove_unreferenced_vertices()
+    result = trimesh.Trimesh(*make_manifold(points, triangles), process=False)
     colours = vertex_colours(mesh)
     if colours is not None:
         nearest = cKDTree(mesh.vertices).query(result.vertices)[1]
