@@ -144,11 +144,11 @@ def test_image_hull_features_by_hand():
         source_dirs=torch.tensor((((0.0, 1.0, 0.0),),)),
         mirrored=torch.tensor((1.0,)),
     )
-    numbers = torch.tanh(torch.tensor((0.4, 2.0, -0.16, -0.8)))
+    numbers = torch.tanh(torch.tensor((0.4, 2.0, 8.0, -0.16, -0.8, -3.2)))
     expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))
     features = ImageHullFeatures()
     torch.testing.assert_close(features(readings)[0, 0], expected)
-    assert features.num_extras == 11
+    assert features.num_extras == 13
     assert ImageFeatures()(readings).shape == (1, 1, 0) and ImageFeatures().num_extras == 0
 
 
