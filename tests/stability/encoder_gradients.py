@@ -59,7 +59,7 @@ def trunk(module: nn.Module) -> StackedHourglass:
 
 
 def gradient_ratio(build: Callable[[int], nn.Module], stacks: int, seed: int) -> tuple[float, float]:
-    """RMS gradient of the first layer over that of the stack's last one, and the first's own, at the start."""
+    """RMS gradient of the first layer over that of the stack's last one, and its own, at the start."""
     torch.manual_seed(seed)
     module = build(stacks)
     images = torch.randn(3, 4, SIZE, SIZE)
