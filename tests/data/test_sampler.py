@@ -1,5 +1,7 @@
 """Which batch comes next: exact counts at exact batches, whatever the epochs and resumes between."""
 
+from itertools import chain
+
 import pytest
 import torch
 
@@ -15,8 +17,9 @@ class Run:
     def __init__(self, step: int = 0) -> None:
         self.step = step
 
-    def __call__(self) -> RunPosition:
-        return RunPosition(step=self.step, seconds=0.5 * self.step, progress=self.step / LONG)
+    def __call__(self, step: int | None = None) -> RunPosition:
+        step = self.step if step is None else step
+        return RunPosition(step=step, seconds=0.5 * step, progress=step / LONG)
 
 
 def schedule(until: dict[str, float]) -> PhaseSchedule:
@@ -25,14 +28,19 @@ def schedule(until: dict[str, float]) -> PhaseSchedule:
     return PhaseSchedule(phases=[few, many])
 
 
-def epochs(run: Run, sampler: PhaseSampler, *, stop_at: int = LONG) -> list[list[BatchRequest]]:
-    """Train as the trainer does: one request, one step, until the budget or a stop."""
+def epochs(
+    run: Run, sampler: PhaseSampler, *, stop_at: int = LONG, ahead: int = 0
+) -> list[list[BatchRequest]]:
+    """Train as the trainer does: requests are made `ahead` of the steps, until the budget or a stop."""
     done: list[list[BatchRequest]] = []
     while run.step < min(stop_at, LONG):
         done.append([])
-        for request in sampler:
-            done[-1].append(request)
-            run.step += 1
+        waiting: list[BatchRequest] = []
+        for request in chain(sampler, [None] * ahead):
+            waiting += [request] if request is not None else []
+            if len(waiting) > ahead or (request is None and waiting):
+                done[-1].append(waiting.pop(0))
+                run.step += 1
             if run.step >= stop_at:
                 break
     return done
@@ -40,9 +48,12 @@ def epochs(run: Run, sampler: PhaseSampler, *, stop_at: int = LONG) -> list[list
 
 @pytest.mark.parametrize("until", [{"steps": 4}, {"share": 0.4}, {"seconds": 2.0}])
 @pytest.mark.parametrize("num_marks", [1, 2, 3, 10])
-def test_counts_change_at_the_exact_batch(until, num_marks):
+@pytest.mark.parametrize("ahead", [0, 1, 3])
+def test_counts_change_at_the_exact_batch(until, num_marks, ahead):
+    """Also where the trainer asks for batches before it has done the steps of those it has."""
     run = Run()
-    done = epochs(run, PhaseSampler(schedule=schedule(until), position=run, num_marks=num_marks))
+    sampler = PhaseSampler(schedule=schedule(until), position=run, num_marks=num_marks)
+    done = epochs(run, sampler, ahead=ahead)
     requests = [request for epoch in done for request in epoch]
     assert [request.step for request in requests] == list(range(LONG))
     assert [request.rays for request in requests] == [10] * 4 + [100] * 6

@@ -22,8 +22,8 @@ class RunPosition:
 class Position(Protocol):
     """Something that knows where the run stands."""
 
-    def __call__(self) -> RunPosition:
-        """Return the position now."""
+    def __call__(self, step: int | None = None) -> RunPosition:
+        """Return the position now, or as it is at this moment of time once `step` steps are done."""
         ...
 
 
@@ -67,12 +67,10 @@ class PhaseSampler(Sampler[BatchRequest]):
         self.num_marks = num_marks
 
     def __iter__(self) -> Iterator[BatchRequest]:
-        """Yield requests of one epoch."""
-        stretch = self._stretch(self.position())
-        while True:
-            now = self.position()
-            if now.progress >= 1.0 or self._stretch(now) > stretch:
-                return
+        """Yield requests of one epoch; they are counted here, since the trainer asks for them ahead of its steps."""
+        now = self.position()
+        stretch = self._stretch(now)
+        while now.progress < 1.0 and self._stretch(now) <= stretch:
             arguments = {"step": now.step, "seconds": now.seconds, "progress": now.progress}
             index = self.schedule.index_at(**arguments)
             phase = self.schedule.phases[index]
@@ -83,6 +81,7 @@ class PhaseSampler(Sampler[BatchRequest]):
                 phase=index,
                 loss_weights=phase.loss_weights,
             )
+            now = self.position(now.step + 1)
 
     def _stretch(self, now: RunPosition) -> int:
         return int(now.progress * self.num_marks)

@@ -31,13 +31,13 @@ class RunClock(L.Callback):
         running = 0.0 if self._running_since is None else time.perf_counter() - self._running_since
         return self._done_seconds + running
 
-    def position(self) -> RunPosition:
-        """Where the run stands."""
-        seconds = self.seconds
+    def position(self, step: int | None = None) -> RunPosition:
+        """Where the run stands, or, as far as steps tell, will stand once `step` of them are done."""
+        step, seconds = self.steps if step is None else step, self.seconds
         progress = progress_of_run(
-            step=self.steps, seconds=seconds, budget_steps=self.budget_steps, budget_seconds=self.budget_seconds
+            step=step, seconds=seconds, budget_steps=self.budget_steps, budget_seconds=self.budget_seconds
         )
-        return RunPosition(step=self.steps, seconds=seconds, progress=progress)
+        return RunPosition(step=step, seconds=seconds, progress=progress)
 
     def pause(self) -> None:
         """Stop counting (evaluation, checkpoints)."""
