@@ -3,9 +3,12 @@
 A surface drawn at too low a density takes in haze, at too high a density it loses hands and feet. What
 decides is where rendering sees the surface: along each ray of cameras around the character, the depth at
 which half of the light is gone. The level whose surface lies nearest to these depths is taken; how its
-silhouettes fit the drawings' masks is reported beside it. (On five real characters a young model's best
-F-scores lay at 8 to 20 per metre and this rule chose 8 to 16; silhouettes alone, rendered or drawn, chose
-3 to 8: they do not see haze in hollows.)
+silhouettes fit the drawings' masks is reported beside it.
+
+Measured on five real test and validation characters: after 40 minutes of training the rule chose 12.6 to 20 per
+metre, character by character, and its F-scores lay within 0.02 of those of the best level; after 3 minutes it
+chose 10 to 16, within 0.06. Silhouettes alone, rendered or drawn, chose 3 to 8 there, up to 0.2 below the best:
+they do not see haze in hollows.
 """
 
 from __future__ import annotations
