@@ -6,7 +6,7 @@ which half of the light is gone. The level whose surface lies nearest to these d
 silhouettes fit the drawings' masks is reported beside it.
 
 Measured on five real characters of test and validation: after 40 minutes of training the rule chose 12.6 to
-20 per metre, character by character, and its F-scores lay within 0.02 of those of the best level; after 3
+20 per metre, character by character, and its F-scores lay within 0.03 of those of the best level; after 3
 minutes it chose 10 to 16, within 0.06. Silhouettes alone, rendered or drawn, chose 3 to 8 there, up to 0.2
 below the best: they do not see haze in hollows.
 """
