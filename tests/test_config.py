@@ -224,7 +224,7 @@ def test_own_classes_are_trusted_from_the_command_line_only(
 def test_combinations_that_can_not_work_are_named() -> None:
     assert (
         problem("combinator=sa", "combinator.num_heads=3")
-        == "combinator.num_heads: found 3, expected a divisor of scale.width = 16."
+        == "combinator.num_heads: found 3, expected a divisor of model.width = 16."
     )
     assert problem("budget.steps=null", "budget.seconds=null").startswith(
         "budget.steps: found null, and budget."
@@ -261,6 +261,21 @@ def test_settings_that_would_be_overwritten_are_refused() -> None:
         == "encoder.in_channels: charnerf sets 'in_channels' of"
         " charnerf.models.encoders.single.SingleHourglass itself; remove it."
     )
+
+
+def test_what_a_class_refuses_is_told_before_any_work() -> None:
+    assert problem("+loss.weights.colour=1").startswith(
+        "loss.weights.colour: found an unknown term, expected one of "
+    )
+
+
+def test_settings_without_effect_are_warned_of(conf: Path) -> None:
+    with pytest.warns(UserWarning, match=r"features=image_hull reads the hull, but model\.hull=false"):
+        check_command_line(["scale=smoke", "features=image_hull", "model.hull=false"], conf=conf)
+    phase = "_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0"
+    late = f"schedule.phases=[{{{phase}, until: {{steps: 50}}}},{{{phase}}}]"
+    with pytest.warns(UserWarning, match=r"schedule\.phases\.0\.until\.steps=50, but budget\.steps=4: later"):
+        check_command_line(["scale=smoke", "budget.steps=4", late], conf=conf)
 
 
 def test_all_problems_come_at_once() -> None:

@@ -159,7 +159,7 @@ def test_files_that_are_no_weights_are_named(tmp_path: Path, weights: Path) -> N
     with pytest.raises(DataError, match=r"foreign\.safetensors: found format None"):
         charnerf.load(foreign)
     with pytest.raises(DataError, match="do not fit its config"):
-        charnerf.load(rewritten(weights, {"scale": {"width": 32}}))
+        charnerf.load(rewritten(weights, {"model": {"width": 32}}))
 
 
 def test_a_hero_is_rendered_and_meshed(weights: Path) -> None:

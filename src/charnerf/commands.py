@@ -124,7 +124,7 @@ def evaluate(
         raise ConfigError(f"--views: found '{views}', expected a number from 1 on, or all.")
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     if views is None:
-        views = str(model.config.scale.eval_views or "all")
+        views = str(OmegaConf.select(model.config, "scale.eval_views", default=24) or "all")
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
     metrics = evaluate_split(

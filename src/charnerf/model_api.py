@@ -48,7 +48,7 @@ class Model:
     @property
     def image_size(self) -> int:
         """Side of the drawings that the encoder was trained on, pixels."""
-        return int(self.config.scale.image_size)
+        return int(self.config.model.image_size)
 
     @property
     def device(self) -> torch.device:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from hydra.errors import InstantiationException
 from hydra.utils import get_object, instantiate
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -17,7 +18,7 @@ from torch import Tensor
 from yaml import YAMLError
 
 from charnerf.config import MODEL_SECTIONS, validate_model
-from charnerf.errors import ConfigError, DataError
+from charnerf.errors import CharNeRFError, ConfigError, DataError
 from charnerf.model_api import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.field import Field
@@ -37,9 +38,13 @@ def build_part(section: DictConfig, given: Mapping[str, Any] | None = None) -> A
             class does not take (the mean has no width) are left out.
     """
     taken = inspect.signature(get_object(section._target_)).parameters
-    return instantiate(
-        section, _convert_="all", **{name: value for name, value in (given or {}).items() if name in taken}
-    )
+    chosen = {name: value for name, value in (given or {}).items() if name in taken}
+    try:
+        return instantiate(section, _convert_="all", **chosen)
+    except InstantiationException as error:
+        if isinstance(error.__cause__, CharNeRFError):
+            raise error.__cause__ from error
+        raise ConfigError(f"{section._target_}: can not be built: {error.__cause__ or error}") from error
 
 
 def build_model(cfg: DictConfig) -> CharNeRF:
@@ -47,7 +52,7 @@ def build_model(cfg: DictConfig) -> CharNeRF:
     encoder = build_part(cfg.encoder, {"in_channels": IMAGE_CHANNELS})
     features = build_part(cfg.features)
     settings = cfg.model
-    width = {"width": int(cfg.scale.width)}
+    width = {"width": int(cfg.model.width)}
 
     def build_field() -> Field:
         return Field(
@@ -58,9 +63,9 @@ def build_model(cfg: DictConfig) -> CharNeRF:
             feature_channels=encoder.out_channels,
             encoded_size=2 * 3 * settings.num_frequencies,
             num_extras=features.num_extras,
-            width=cfg.scale.width,
-            num_single_view_blocks=cfg.scale.num_single_view_blocks,
-            num_multi_view_blocks=cfg.scale.num_multi_view_blocks,
+            width=cfg.model.width,
+            num_single_view_blocks=cfg.model.num_single_view_blocks,
+            num_multi_view_blocks=cfg.model.num_multi_view_blocks,
         )
 
     return CharNeRF(

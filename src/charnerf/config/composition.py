@@ -19,7 +19,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from charnerf.config.hints import nearest
-from charnerf.config.validation import check_files, validate
+from charnerf.config.validation import check_files, validate, warn_of_idle_settings
 from charnerf.errors import CharNeRFError, ConfigError
 
 FAILED, WRONG_CALL = 1, 2
@@ -76,6 +76,7 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
                 cfg = _compose(name, more + job)
                 validate(cfg, trusted_targets=trusted_by(job))
                 check_files(cfg)
+                warn_of_idle_settings(cfg)
             except ConfigError as error:
                 broken.append((job, error))
     if not broken:

@@ -5,9 +5,10 @@ import dataclasses
 
 @dataclasses.dataclass
 class Problems:
-    """The problems found so far, and the modules whose classes may be named."""
+    """Problems found so far, modules whose classes may be named, and keys that repeat another key's value."""
 
     trusted: tuple[str, ...] = ()
+    copies: dict[str, str] = dataclasses.field(default_factory=dict)
     found: list[tuple[str, str]] = dataclasses.field(default_factory=list)
 
     def add(self, key: str, message: str) -> None:
@@ -22,8 +23,9 @@ class Problems:
         )
 
     def lines(self) -> list[str]:
-        """One line for each problem, beginning with its full key."""
-        return [f"{key}: {message}" for key, message in self.found]
+        """One line for each problem, by full key; a wrong value is named where it was written."""
+        wrong = {key for key, _ in self.found}
+        return [f"{key}: {message}" for key, message in self.found if self.copies.get(key) not in wrong]
 
 
 def join(key: str, name: str | int) -> str:

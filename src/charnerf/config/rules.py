@@ -12,7 +12,7 @@ Rule = Callable[..., Iterator[tuple[str, str]]]
 
 def _heads_divide_width(heads: int, width: int) -> Iterator[tuple[str, str]]:
     if heads < 1 or width % heads:
-        yield "combinator.num_heads", f"found {heads}, expected a divisor of scale.width = {width}."
+        yield "combinator.num_heads", f"found {heads}, expected a divisor of model.width = {width}."
 
 
 def _something_ends_the_run(steps: int | None, seconds: float | None) -> Iterator[tuple[str, str]]:
@@ -56,7 +56,7 @@ def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
 
 
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
-    (("combinator.num_heads", "scale.width"), _heads_divide_width),
+    (("combinator.num_heads", "model.width"), _heads_divide_width),
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss.weights",), _some_term_counts),
@@ -78,3 +78,21 @@ def check_ranges(plain: Any, key: str, problems: Problems) -> None:
         problems.add(join(key, "near"), f"found {near}, expected below {join(key, 'far')} = {far}.")
     for name, value in plain.items():
         check_ranges(value, join(key, name), problems)
+
+
+def idle_settings(plain: Mapping[str, Any]) -> list[str]:
+    """Settings of a valid config that have no effect in its combination, each with what to do."""
+    found = []
+    if not plain["model"]["hull"] and str(plain["features"]["_target_"]).endswith(".ImageHullFeatures"):
+        found.append(
+            "features=image_hull reads the hull, but model.hull=false: it reads zeros; use features=image."
+        )
+    for index, phase in enumerate(plain["schedule"]["phases"]):
+        for unit, end in (phase.get("until") or {}).items():
+            limit = plain["budget"].get(unit)
+            if limit is not None and end >= limit:
+                found.append(
+                    f"schedule.phases.{index}.until.{unit}={end}, but budget.{unit}={limit}: later phases"
+                    " never begin."
+                )
+    return found

@@ -66,8 +66,12 @@ class Sampling:
 
 @dataclass(frozen=True)
 class ModelSettings:
-    """Settings of the model as a whole."""
+    """Settings of the model as a whole; what weights carry with them holds no other sizes."""
 
+    width: Count
+    num_single_view_blocks: CountOrZero
+    num_multi_view_blocks: CountOrZero
+    image_size: Annotated[int, AtLeast(8)]
     hull: bool
     num_frequencies: Count
     box_centre: list[float]
@@ -118,7 +122,6 @@ class RunConfig:
 
 
 MODEL_SECTIONS = (
-    "scale",
     "model",
     "encoder",
     "combinator",

@@ -1,18 +1,26 @@
 """Reports everything that is wrong with a config, in one error, before any work."""
 
+import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import make_dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from hydra.errors import InstantiationException
+from hydra.utils import instantiate
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from charnerf.config.checks import BROKEN, MISSING, check_section
 from charnerf.config.problems import Problems, join
-from charnerf.config.rules import RULES, check_ranges
+from charnerf.config.rules import RULES, check_ranges, idle_settings
 from charnerf.config.schema import MODEL_SECTIONS, RunConfig
 from charnerf.errors import ConfigError
+
+INTERPOLATION = re.compile(r"\$\{([\w.]+)\}")
+
+TRIED_SECTIONS = ("loss", "schedule", "data")  # constructors that only keep and check their arguments
 
 
 def validate(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
@@ -27,13 +35,31 @@ def validate(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
         ConfigError: Lists every problem, each with its full key.
     """
     _validate_against(RunConfig, cfg, trusted_targets)
+    refused = [line for name in TRIED_SECTIONS for line in _refusals(cfg, name)]
+    if refused:
+        raise ConfigError(as_message(refused))
+
+
+def _refusals(cfg: DictConfig, section: str) -> list[str]:
+    """What the class of a section says against its values."""
+    try:
+        instantiate(cfg[section], _convert_="all")
+    except InstantiationException as error:
+        message = str(error.__cause__ or error)
+        return [message if message.startswith(f"{section}.") else f"{section}: {message}"]
+    return []
 
 
 def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
     """Check, as `validate` does, what the model needs of a config that came with weights."""
     hints = get_type_hints(RunConfig, include_extras=True)
     schema = make_dataclass("ModelConfig", [(name, hints[name]) for name in MODEL_SECTIONS], frozen=True)
-    chosen = OmegaConf.masked_copy(cfg, [name for name in MODEL_SECTIONS if name in cfg])
+    whole = cfg.copy()
+    try:
+        OmegaConf.resolve(whole)  # what sections take from others, before those are left out
+    except OmegaConfBaseException:
+        whole = cfg  # reported below, by key
+    chosen = OmegaConf.masked_copy(whole, [name for name in MODEL_SECTIONS if name in whole])
     _validate_against(schema, chosen, trusted_targets)
 
 
@@ -57,6 +83,12 @@ def check_files(cfg: DictConfig) -> None:
         )
     if problems.found:
         raise ConfigError(as_message(problems.lines()))
+
+
+def warn_of_idle_settings(cfg: DictConfig) -> None:
+    """Warn of settings of a valid config that have no effect in its combination."""
+    for message in idle_settings(to_plain(cfg, "", Problems())):
+        warnings.warn(message, stacklevel=2)
 
 
 def _validate_against(schema: type, cfg: DictConfig, trusted_targets: Sequence[str]) -> None:
@@ -90,6 +122,10 @@ def to_plain(node: Any, key: str, problems: Problems) -> Any:
         return node
     values = {}
     for name in names:
+        if OmegaConf.is_interpolation(node, name):
+            raw = str(OmegaConf.to_container(node, resolve=False)[name])  # type: ignore[index]
+            if found := INTERPOLATION.fullmatch(raw):
+                problems.copies[join(key, name)] = found[1]
         try:
             missing = OmegaConf.is_missing(node, name)
             values[name] = MISSING if missing else to_plain(node[name], join(key, name), problems)
