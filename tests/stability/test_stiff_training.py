@@ -15,20 +15,20 @@ from charnerf.geometry.cameras import pixel_rays
 from charnerf.types import RayBundle
 
 ALWAYS = (
-    "thin rod between balls",
     "learning rate x 100",
     "all-black drawings",
     "all-white drawings",
     "one-pixel silhouettes",
     "character fills the frame",
     "character leaves the frame",
-    "one view",
     "all views empty, without a hull",
     "loss spike of 1e12",
     "phase switch",
     "bfloat16 autocast",
 )
 SELDOM = (
+    "thin rod between balls",
+    "one view",
     "learning rate x 100, paper's model",
     "duplicated views",
     "ReLU density",
