@@ -55,3 +55,21 @@ def test_a_cut_within_the_first_phase_changes_phase_at_the_same_batch(figure_dat
     resumed = small_runs.assemble(cfg, tmp_path / "resumed").fit(tmp_path / "cut/checkpoints/last.ckpt")
     phases = [(batch[0], batch[1]) for batch in resumed.recorder.batches]
     assert phases == [(2, 0), (3, 0), (4, 0), (5, 1), (6, 1), (7, 1)]
+
+
+def test_the_last_checkpoint_is_the_last_one_also_where_nothing_got_better(figure_dataset, tmp_path):
+    """A learning rate of nearly nothing: both validations measure the same."""
+    cfg = small_runs.smoke_config(
+        figure_dataset,
+        "encoder=single",
+        "sampling.train_splits=[val]",
+        "optimizer.lr=1.0e-30",
+        "scale.steps=2",
+        "sampling.num_validations=2",
+    )
+    small_runs.assemble(cfg, tmp_path).fit()
+    done = {
+        name: torch.load(tmp_path / f"checkpoints/{name}.ckpt", weights_only=True)["global_step"]
+        for name in ("best", "last")
+    }
+    assert done == {"best": 1, "last": 2}

@@ -12,9 +12,9 @@ import lightning as L
 from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig, OmegaConf
+from torch.utils.tensorboard.summary import hparams
 
 from charnerf.data.datamodule import MixedDataModule
-from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset, SurfaceOf
 from charnerf.data.sampler import PhaseSampler
 from charnerf.data.store import CharacterStore, OpenCharacter
@@ -32,6 +32,7 @@ from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
 SURFACE_TERMS = ("surface_rgb", "surface_alpha")
+HYPER_METRICS = ("val/psnr", "val/psnr_foreground", "val/ssim")  # columns beside the hyper-parameters
 
 
 def run_training(cfg: DictConfig, folder: Path) -> None:
@@ -154,9 +155,10 @@ def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
             filename="best",
             monitor="val/psnr_foreground",
             mode="max",
-            save_last=True,
             enable_version_counter=False,
         ),
+        # of its own: Lightning's `save_last` writes only where the best improved
+        ModelCheckpoint(dirpath=folder / "checkpoints", filename="last", enable_version_counter=False),
     ]
     return build_part(
         cfg.trainer,
@@ -219,13 +221,24 @@ def find_checkpoint(ckpt_path: str | None, folder: Path) -> Path | None:
 
 
 def log_hyperparameters(trainer: L.Trainer, cfg: DictConfig, model: CharNeRF) -> None:
-    """Write the config and the number of parameters to TensorBoard."""
-    assert trainer.logger is not None
-    values = OmegaConf.to_container(cfg, resolve=True)
-    assert isinstance(values, dict)
-    trainer.logger.log_hyperparams(
-        {**{str(k): v for k, v in values.items()}, "num_parameters": sum(p.numel() for p in model.parameters())}
-    )
+    """Write the config and the number of parameters to TensorBoard's events and to hparams.yaml."""
+    assert isinstance(trainer.logger, TensorBoardLogger)
+    size = sum(parameter.numel() for parameter in model.parameters())
+    values = {**_flat(OmegaConf.to_container(cfg, resolve=True)), "num_parameters": size}
+    trainer.logger.log_hyperparams(values)  # writes no event unless it is given a metric's value
+    for summary in hparams(values, dict.fromkeys(HYPER_METRICS, 0.0)):
+        trainer.logger.experiment.file_writer.add_summary(summary)
+
+
+def _flat(node: Any, key: str = "") -> dict[str, bool | int | float | str]:
+    """Values of nested sections by their full keys."""
+    if not isinstance(node, dict | list):
+        return {key: node if isinstance(node, bool | int | float | str) else str(node)}
+    items = node.items() if isinstance(node, dict) else enumerate(node)
+    flat: dict[str, bool | int | float | str] = {}
+    for name, value in items:
+        flat |= _flat(value, f"{key}.{name}" if key else str(name))
+    return flat
 
 
 def keep_freed_memory() -> None:

@@ -1,0 +1,133 @@
+"""A whole run from a composed config: its folder, TensorBoard's events, and going on from it."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+import small_runs
+import torch
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from charnerf.errors import ConfigError
+from charnerf.losses.total import TERMS
+from charnerf.runs import load, load_config
+from charnerf.training.clock import RunClock
+from charnerf.training.module import rate_at
+from charnerf.training.run import find_checkpoint, run_training, surface_delta, training_renderer
+
+STEPS = 40
+
+
+@pytest.fixture(scope="module")
+def run_folder(figure_dataset, tmp_path_factory) -> Path:
+    """The smallest run with every term that a figure's data set can feed."""
+    folder = tmp_path_factory.mktemp("outputs") / "smoke"
+    weights = "loss.weights={" + ",".join(f"{term}:0.1" for term in TERMS) + "}"
+    settings = (
+        "encoder=single",
+        "loss=charnerf",
+        weights,
+        "schedule=two_phase",
+        "sampling.num_validations=2",
+        "scale.eval_views=1",
+        f"scale.steps={STEPS}",
+        "scale.phase_rays=[16,32]",
+        "scale.phase_surface_points=[8,16]",
+    )
+    run_training(small_runs.smoke_config(figure_dataset, *settings), folder)
+    return folder
+
+
+def test_the_run_folder_is_complete(run_folder):
+    """As design.md lays it out; what tells of the run agrees with itself."""
+    for name in (
+        "config.yaml", "checkpoints/last.ckpt", "checkpoints/best.ckpt", "weights.safetensors", "tensorboard",
+        "curve.csv", "metrics.json", "images", "meshes/twin.glb", "report.md",
+    ):  # fmt: skip
+        assert (run_folder / name).exists(), name
+    metrics = json.loads((run_folder / "metrics.json").read_text())
+    assert metrics["split"] == "test" and list(metrics["per_character"]) == ["twin"]
+    assert metrics["seconds"]["train"] > 0
+    assert load_config(run_folder).loss.weights.depth == 0.1
+    model = load(run_folder)
+    assert not model.network.training
+
+
+def test_the_curve_has_a_row_a_validation(run_folder):
+    with (run_folder / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["step"]) for row in rows] == [20, 40]
+    assert [float(row["phase"]) for row in rows] == [0.0, 1.0]
+    assert [float(row["rays"]) for row in rows] == [16.0, 32.0]
+    assert 0 < float(rows[0]["seconds"]) < float(rows[1]["seconds"])
+    assert all(
+        float(row[name]) > 0 for row in rows for name in ("val_psnr", "val_psnr_foreground", "val_ssim")
+    )
+    assert all(float(row[term]) >= 0 for row in rows for term in TERMS)
+
+
+def test_tensorboards_own_reader_finds_everything(run_folder):
+    events = EventAccumulator(str(run_folder / "tensorboard"), size_guidance={"tensors": 0}).Reload()
+    tags = events.Tags()
+    scalars = set(tags["scalars"])
+    wanted = {f"train/loss/{term}" for term in (*TERMS, "total")}
+    wanted |= {"train/rays", "train/surface_points", "train/phase", "train/seconds", "train/lr"}
+    wanted |= {"train/opacity_foreground", "val/psnr", "val/psnr_foreground", "val/ssim"}
+    assert wanted <= scalars
+    assert {event.value for event in events.Scalars("train/rays")} <= {16.0, 32.0}
+    seconds = [event.value for event in events.Scalars("train/seconds")]
+    assert seconds == sorted(seconds) and seconds[0] > 0
+    assert {"val/inputs/0", "val/truth_prediction_depth_opacity/0"} <= set(tags["images"])
+    grid = events.Images("val/truth_prediction_depth_opacity/0")[-1]
+    assert (grid.width, grid.height) == (4 * 32, 32)
+    assert (events.Images("val/inputs/0")[-1].width, len(events.Images("val/inputs/0"))) == (3 * 32, 2)
+    assert any(tag.startswith("mesh/twin") for tag in tags["tensors"])
+    settings = events.summary_metadata["_hparams_/session_start_info"].plugin_data.content
+    assert b"num_parameters" in settings and b"model.box_half_extent" in settings
+    assert b"val/psnr_foreground" in events.summary_metadata["_hparams_/experiment"].plugin_data.content
+
+
+def test_a_checkpoint_is_found_or_named(run_folder, tmp_path):
+    last = run_folder / "checkpoints/last.ckpt"
+    assert find_checkpoint(None, tmp_path) is None
+    assert find_checkpoint("last", run_folder) == last
+    assert find_checkpoint("last", run_folder.parent / "next") == last  # the newest beside it
+    assert find_checkpoint(str(last), tmp_path) == last
+    with pytest.raises(ConfigError, match=r"ckpt_path: found 'gone\.ckpt', which is no file"):
+        find_checkpoint("gone.ckpt", tmp_path)
+    with pytest.raises(ConfigError, match="ckpt_path: found `last`, but no run beside"):
+        find_checkpoint("last", tmp_path / "a/b")
+
+
+def test_a_checkpoint_holds_nothing_but_numbers_and_names(run_folder):
+    content = torch.load(run_folder / "checkpoints/last.ckpt", weights_only=True)
+    assert content["global_step"] == STEPS  # of the last validation, whether it was the best or not
+    assert content["callbacks"]["RunClock"]["steps"] == STEPS
+
+
+def test_the_rate_rises_then_falls_by_a_cosine():
+    assert rate_at(0.0, final=0.1) == pytest.approx(0.05)
+    assert rate_at(0.01, final=0.1) == pytest.approx(1.0, abs=1e-3)
+    assert rate_at(0.5, final=0.1) == pytest.approx(0.55)
+    assert rate_at(1.0, final=0.1) == pytest.approx(0.1)
+    assert rate_at(0.7, final=1.0) == 1.0
+
+
+def test_the_clock_counts_training_only():
+    clock = RunClock(steps=10, seconds=None)
+    assert clock.position().progress == 0.0 and clock.seconds == 0.0
+    clock.on_train_epoch_start(None, None)
+    clock.pause()
+    stopped = clock.seconds
+    assert 0 < stopped == clock.seconds
+    assert clock.position(step=7).progress == 0.7 and clock.position().step == 0
+    other = RunClock(steps=None, seconds=2.0 * stopped)
+    other.load_state_dict(clock.state_dict())
+    assert other.position().progress == pytest.approx(0.5)
+
+
+def test_the_training_renderer_has_its_own_samples(figure_dataset):
+    cfg = small_runs.smoke_config(figure_dataset, "scale.num_coarse=24", "scale.train_num_coarse=6")
+    assert training_renderer(cfg).num_coarse == 6 and cfg.renderer.num_coarse == 24
+    assert surface_delta(cfg) == pytest.approx(3.6 / 6)
