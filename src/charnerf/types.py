@@ -6,7 +6,7 @@ Frames (design): world in metres, +Z up, facing -Y; cameras OpenGL/Blender (+X r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -41,6 +41,21 @@ class TensorRecord:
     def __getitem__(self, index: Any) -> Self:
         """Index the shared leading axes of every tensor field."""
         return self._map(lambda value: value[index])
+
+    @classmethod
+    def joined(cls, records: Sequence[Self]) -> Self:
+        """Concatenate records along the first axis; fields that are no tensors are those of the first."""
+        first = records[0]
+        if len(records) == 1:
+            return first
+        changed: dict[str, Any] = {}
+        for field in fields(first):  # type: ignore[arg-type]
+            value, others = getattr(first, field.name), [getattr(one, field.name) for one in records]
+            if isinstance(value, Tensor):
+                changed[field.name] = torch.cat(others)
+            elif isinstance(value, TensorRecord):
+                changed[field.name] = type(value).joined(others)
+        return replace(first, **changed)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True)
@@ -146,10 +161,18 @@ FieldFunction = Callable[[Tensor, Tensor], FieldOutput]
 
 @dataclass(frozen=True)
 class DensityAnswer:
-    """Densities now, colours on demand: `rgb_of(index (Q,))` gives the colours (Q, 3) of some of the points."""
+    """Densities now, colours on demand.
+
+    Attributes:
+        densities: (P,), 1/m.
+        state: What colours of the points (P) are made of; parts of it are taken by index, parts of several answers of one field
+            are joined.
+        colours: From such a part (Q,) to colours (Q, 3).
+    """
 
     densities: Tensor
-    rgb_of: Callable[[Tensor], Tensor]
+    state: TensorRecord
+    colours: Callable[[Any], Tensor]
 
 
 DensityFunction = Callable[[Tensor, Tensor], DensityAnswer]
@@ -183,12 +206,16 @@ class Scene:
         if self.densities_first is not None:
             return self.densities_first(points, view_dirs)
         answer = self.field(points, view_dirs)
-        return DensityAnswer(densities=answer.densities, rgb_of=lambda index: answer.rgb[index])
+        return DensityAnswer(densities=answer.densities, state=answer, colours=_colours_known)
 
     @property
     def field(self) -> FieldFunction:
         """The finest field there is."""
         return self.coarse if self.fine is None else self.fine
+
+
+def _colours_known(answer: FieldOutput) -> Tensor:
+    return answer.rgb
 
 
 @dataclass(frozen=True)
@@ -232,12 +259,37 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
+class ErrorEstimate:
+    """What an adaptive renderer was asked for, what it believes to have kept, and what it did.
+
+    Attributes:
+        asked: Largest error of a colour asked for.
+        estimated: Estimated error of each ray's colour, (...).
+        num_samples: Densities evaluated.
+        num_colours: Colours evaluated.
+        num_stopped: Rays whose far part was left out because what lies before is opaque.
+        num_unresolved: Rays whose estimate stayed above what was asked.
+    """
+
+    asked: float
+    estimated: Tensor
+    num_samples: int
+    num_colours: int
+    num_stopped: int
+    num_unresolved: int
+
+
+@dataclass(frozen=True)
 class Rendering:
-    """A rendering by the finest pass, the coarse pass where there were two, and what was left out."""
+    """A rendering by the finest pass, the coarse pass where there were two, what was left out, and what error that made.
+
+    The estimate is None of renderers that make no error of their own.
+    """
 
     finest: RenderOutput
     coarse: RenderOutput | None
     left_out: LeftOut
+    estimate: ErrorEstimate | None = None
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,16 @@
 """One radiance field: lookup -> f1 -> H -> f2 -> colour and density. Coarse and fine are two of these over one encoder."""
 
+from dataclasses import dataclass, replace
 from typing import final
 
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
-from charnerf.models.density.base import AbstractDensity
+from charnerf.models.density.base import AbstractDensity, TrunkOutput
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.inputs import PointInputs
 from charnerf.models.stages import MultiView, SingleView
-from charnerf.types import DensityAnswer, FieldOutput
+from charnerf.types import DensityAnswer, FieldOutput, TensorRecord
 
 
 @final
@@ -65,12 +66,15 @@ class Field(nn.Module):
     def densities(self, inputs: PointInputs) -> DensityAnswer:
         """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps."""
         trunk = self.density.trunk(inputs, self.single_view, self.combinator, self.multi_view)
+        # what only the trunk reads need not be kept
+        seen = replace(inputs, latents=inputs.latents[..., :0], extras=inputs.extras[..., :0])
+        return DensityAnswer(
+            densities=self.activation(trunk.raw_densities), state=_Half(trunk, seen), colours=self._colours
+        )
 
-        def rgb_of(index: Tensor) -> Tensor:
-            some, seen = trunk[index], inputs[index]
-            return self.head(self.density.directed(some, seen, self.combinator), some.view_features, seen)
-
-        return DensityAnswer(densities=self.activation(trunk.raw_densities), rgb_of=rgb_of)
+    def _colours(self, half: "_Half") -> Tensor:
+        features = self.density.directed(half.trunk, half.inputs, self.combinator)
+        return self.head(features, half.trunk.view_features, half.inputs)
 
     def hoist(self, rows: Tensor) -> Tensor:
         """Apply the linear layer of the features to the maps' rows (N, F) -> (N, D), once instead of at every point.
@@ -78,3 +82,11 @@ class Field(nn.Module):
         Bilinear reading commutes with a linear map (its weights sum to 1, so with the bias too): equal to rounding.
         """
         return self.from_latents(rows)
+
+
+@dataclass(frozen=True)
+class _Half(TensorRecord):
+    """What is known of points once their densities are."""
+
+    trunk: TrunkOutput
+    inputs: PointInputs

@@ -1,6 +1,7 @@
 """All that a character's views show, prepared once as rows, and read at points.
 
-Letters: P points, V views, C channels. Everything that does not depend on the point (camera matrices, drawings on white, maps of
+Letters: P points, V views, C channels. Everything that does not depend on the point (camera matrices,
+drawings on white, maps of
 the hull) is computed here once a character instead of once a sample.
 """
 
@@ -45,8 +46,10 @@ class ViewMaps:
         cameras: (V,).
         parallel: Whether every camera is orthographic: no perspective division, one direction a view.
         map_size: Width and height of the feature maps.
-        pictures: Rows (V * H * W, 3), or (V * H * W, 5) where the hull's maps have the pictures' size and lie beside the colours.
-        hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None without a hull or where
+        pictures: Rows (V * H * W, 3), or (V * H * W, 5) where the hull's maps have the pictures' size and
+            lie beside the colours.
+        hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
+            without a hull or where
             they lie beside the colours.
         hull_size: Width and height of the hull's maps.
     """

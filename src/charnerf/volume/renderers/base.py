@@ -17,6 +17,7 @@ from charnerf.geometry.rays import box_interval, occupied_to_t, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, merge_t_vals, stratified_t_vals
 from charnerf.types import (
     Cameras,
+    ErrorEstimate,
     FieldFunction,
     FieldOutput,
     LeftOut,
@@ -97,6 +98,7 @@ class AbstractRenderer(ABC):
             finest=_as_picture([part.finest for part in parts], shape),
             coarse=_as_picture(coarse, shape) if coarse else None,
             left_out=left_out,
+            estimate=_joined([part.estimate for part in parts if part.estimate is not None], shape),
         )
 
     def _two_passes(
@@ -158,7 +160,7 @@ class AbstractRenderer(ABC):
 
     def _in_chunks(self, field: FieldFunction, points: Tensor, dirs: Tensor) -> FieldOutput:
         """Answers at points (P, 3), a chunk at a time."""
-        size = chunk_size(self.memory_mib)
+        size = min(chunk_size(self.memory_mib), POINTS_AT_ONCE)
         parts = [field(points[i : i + size], dirs[i : i + size]) for i in range(0, len(points), size)]
         if not parts:
             return FieldOutput(rgb=torch.zeros_like(points), densities=torch.zeros_like(points[:, 0]))
@@ -169,12 +171,29 @@ class AbstractRenderer(ABC):
         )
 
 
+POINTS_AT_ONCE = (
+    4096  # more leave the caches: 8192 cost as much a point, 16384 nearly twice (two cores of a server)
+)
 BYTES_A_POINT = 16_384  # what a point may take with four views at width 64, gradient kept; measured, generous
 
 
 def chunk_size(memory_mib: float) -> int:
     """Points a chunk within a memory budget, at least 256."""
     return max(256, int(memory_mib * 2**20 / BYTES_A_POINT))
+
+
+def _joined(estimates: list[ErrorEstimate], shape: tuple[int, int]) -> ErrorEstimate | None:
+    """One estimate of the parts of a picture."""
+    if not estimates:
+        return None
+    return ErrorEstimate(
+        asked=estimates[0].asked,
+        estimated=torch.cat([one.estimated for one in estimates]).reshape(shape),
+        num_samples=sum(one.num_samples for one in estimates),
+        num_colours=sum(one.num_colours for one in estimates),
+        num_stopped=sum(one.num_stopped for one in estimates),
+        num_unresolved=sum(one.num_unresolved for one in estimates),
+    )
 
 
 def _as_picture(outputs: list[RenderOutput], shape: tuple[int, int]) -> RenderOutput:

@@ -1,0 +1,1 @@
+"""Error against run time: the baseline, the methods, their references, sweeps, tables, plots."""

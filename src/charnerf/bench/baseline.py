@@ -1,0 +1,169 @@
+"""The same network evaluated like pixelNeRF's authors do: what all speed-ups are measured against.
+
+Every sample of every ray in every view, images read by grid_sample, linear maps applied at each point and
+not on the maps, one
+large batch. Written from that description, not from their code. The visual hull belongs to our model
+(outside it the density is
+zero by definition): it is applied to the densities afterwards and saves nothing here.
+
+Letters: R rays, S samples a ray, P points, V views, C channels.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from charnerf.geometry.cameras import directions_to_points, project
+from charnerf.geometry.encoding import positional_encoding
+from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.rays import box_interval, points_along
+from charnerf.geometry.sampling import edges_from_t_vals, importance_t_vals, merge_t_vals, stratified_t_vals
+from charnerf.models.charnerf import HULL_DEPTH_FADE, CharNeRF, EncodedViews
+from charnerf.models.features.base import ViewReadings
+from charnerf.models.field import Field
+from charnerf.models.inputs import PointInputs
+from charnerf.types import FieldOutput, Hull, RayBundle, RenderOutput, SourceViews
+from charnerf.volume.compositing import composite, expected_depth, weights_from_densities
+
+POINTS_AT_ONCE = 50_000  # pixelNeRF's evaluation batch
+NUM_COARSE, NUM_FINE = 64, 32  # its samples a ray
+
+
+@dataclass(frozen=True)
+class PixelAligned:
+    """What the baseline reads: maps (V, C, h, w) of one character, not hoisted."""
+
+    views: SourceViews
+    feature_maps: Tensor
+    pictures: Tensor
+    hull: Hull | None
+    hull_maps: Tensor | None
+
+    @classmethod
+    def of(cls, encoded: EncodedViews, index: int = 0) -> "PixelAligned":
+        """One character of a batch of encoded views."""
+        views = encoded.views[index]
+        rgb, alpha = views.images[:, :3], views.images[:, 3:]
+        hull = None if encoded.hull is None else encoded.hull[index]
+        maps = None if hull is None else torch.stack((hull.front_depths, hull.edge_distances), dim=1)
+        return cls(views, encoded.feature_maps[index], rgb * alpha + (1.0 - alpha), hull, maps)
+
+
+@final
+class PixelNeRFLike:
+    """Renders rays by evaluating everything.
+
+    A network with one field is asked once for each of the 64 + 32 samples (the authors' code asks twice
+    for the first 64, of two
+    networks); one with two fields as there: the coarse one at 64, the fine one at all 96.
+
+    Args:
+        network: The trained network.
+        num_coarse: Equal bins between near and far of the box.
+        num_fine: Further samples drawn by the coarse weights.
+    """
+
+    def __init__(self, network: CharNeRF, *, num_coarse: int = NUM_COARSE, num_fine: int = NUM_FINE) -> None:
+        self.network, self.num_coarse, self.num_fine = network, num_coarse, num_fine
+
+    def render(
+        self, maps: PixelAligned, rays: RayBundle, generator: torch.Generator | None = None
+    ) -> RenderOutput:
+        """Render rays (R,)."""
+        near, far = box_interval(rays, *self.network.box)
+        coarse = stratified_t_vals(near, far, self.num_coarse, generator)
+        answer = self._ask(self.network.coarse, maps, rays, coarse)
+        weights, _ = weights_from_densities(
+            answer.densities, edges_from_t_vals(coarse, near, far).diff(dim=-1)
+        )
+        edges = edges_from_t_vals(coarse, near, far)
+        drawn = importance_t_vals(edges, weights.detach(), self.num_fine, generator)
+        t_vals = merge_t_vals(coarse, drawn)
+        if self.network.fine is not None:
+            answer = self._ask(self.network.fine, maps, rays, t_vals)
+        else:
+            more = self._ask(self.network.coarse, maps, rays, drawn)
+            order = torch.cat((coarse, drawn), dim=-1).argsort(dim=-1)
+            answer = FieldOutput(
+                rgb=torch.cat((answer.rgb, more.rgb), 1).gather(1, order[..., None].expand(-1, -1, 3)),
+                densities=torch.cat((answer.densities, more.densities), 1).gather(1, order),
+            )
+        widths = edges_from_t_vals(t_vals, near, far).diff(dim=-1)
+        weights, _ = weights_from_densities(answer.densities, widths)
+        return RenderOutput(
+            rgb=composite(weights, answer.rgb, weights.new_tensor(1.0)),
+            opacity=weights.sum(-1),
+            depth=expected_depth(weights, t_vals, far),
+        )
+
+    def _ask(self, field: Field, maps: PixelAligned, rays: RayBundle, t_vals: Tensor) -> FieldOutput:
+        """Answers at all samples (R, S), density zero outside the hull."""
+        points = points_along(rays, t_vals)
+        dirs = rays.directions[:, None].expand_as(points).reshape(-1, 3)
+        flat = points.reshape(-1, 3)
+        parts = [
+            self._evaluate(field, maps, flat[i : i + POINTS_AT_ONCE], dirs[i : i + POINTS_AT_ONCE])
+            for i in range(0, len(flat), POINTS_AT_ONCE)
+        ]
+        densities = torch.cat([part.densities for part in parts]).reshape(t_vals.shape)
+        if maps.hull is not None:
+            densities = densities * hull_contains(maps.hull, points)
+        return FieldOutput(
+            rgb=torch.cat([part.rgb for part in parts]).reshape(points.shape), densities=densities
+        )
+
+    def _evaluate(self, field: Field, maps: PixelAligned, points: Tensor, view_dirs: Tensor) -> FieldOutput:
+        """Colour and density of points (P, 3): every map read in every view, every linear map at every point."""
+        cameras = maps.views.cameras
+        pixels, depth, in_front = project(cameras[:, None], points[None])  # (V, P, ..)
+        size = pixels.new_tensor((cameras.width, cameras.height))
+        valid = (in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)).T
+        latents = field.from_latents(_read(maps.feature_maps, pixels / size)) * valid[..., None]
+        source_rgb = _read(maps.pictures, pixels / size)
+        behind, edge = self._read_hull(maps, pixels / size, depth.T, points)
+        source_dirs = directions_to_points(cameras, points)
+        readings = ViewReadings(
+            source_rgb=source_rgb,
+            behind=behind,
+            edge=edge,
+            source_dirs=source_dirs,
+            mirrored=maps.views.mirrored.to(points.dtype),
+        )
+        network = self.network
+        encoded = positional_encoding(
+            (points - network.box_centre) / network.box_half_extent, network.num_frequencies
+        )
+        return field(
+            PointInputs(
+                latents=latents,
+                extras=network.features(readings),
+                source_rgb=source_rgb,
+                visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
+                valid=valid,
+                encoded_points=encoded,
+                view_dirs=view_dirs,
+                source_dirs=source_dirs,
+            )
+        )
+
+    def _read_hull(
+        self, maps: PixelAligned, shares: Tensor, depth: Tensor, points: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """As the model reads it: distance behind the hull's front and from the mask's edge, (P, V) each."""
+        if maps.hull_maps is None:
+            return torch.zeros_like(depth), torch.zeros_like(depth)
+        front, edge = _read(maps.hull_maps, shares).unbind(-1)
+        cameras = maps.views.cameras
+        distance = (points[:, None] - cameras.world_from_camera[:, :3, 3]).norm(dim=-1)
+        along = torch.where(cameras.orthographic, depth, distance)
+        return (along - front) / self.network.box_half_extent, edge / cameras.width
+
+
+def _read(maps: Tensor, shares: Tensor) -> Tensor:
+    """Bilinear readings (P, V, C) of maps (V, C, h, w) at shares (V, P, 2) of the picture's sides."""
+    grid = (2.0 * shares - 1.0)[:, :, None]
+    read = F.grid_sample(maps, grid, mode="bilinear", padding_mode="border", align_corners=False)
+    return read[..., 0].permute(2, 0, 1)

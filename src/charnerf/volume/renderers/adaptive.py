@@ -1,0 +1,284 @@
+"""Evaluates as little as a tolerance allows, like an adaptive integrator, and says what error it made.
+
+Letters: R rays, K bins a ray, P points. For each ray: bins on the hull's segments; densities front to back
+until nothing behind
+can be seen; colours only of samples that count; an estimate of the error of every bin; bins with large
+errors cut into three,
+their samples kept, until the estimate is below the tolerance.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import torch
+from torch import Tensor
+
+from charnerf.geometry.occupied import candidates, occupied_at, segment_bins
+from charnerf.geometry.rays import box_interval
+from charnerf.types import (
+    ErrorEstimate,
+    FieldFunction,
+    FieldOutput,
+    LeftOut,
+    RayBundle,
+    Rendering,
+    RenderOutput,
+    Scene,
+)
+from charnerf.volume.compositing import expected_depth
+from charnerf.volume.quadrature.base import AbstractQuadrature
+from charnerf.volume.renderers.base import WHITE, AbstractRenderer, chunk_size
+from charnerf.volume.renderers.culled import CulledRenderer
+from charnerf.volume.renderers.refinement import Marched, light_before, march, split_bins
+from charnerf.volume.renderers.samples import Samples
+
+SPACING = 0.04  # m: longest bin at the start; no feature of a field read from drawings is much thinner
+MAX_BINS = 128  # of a ray at the start
+UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque surface
+COLOUR_SHARE = 0.05  # of the tolerance: weight from which on a sample's colour is evaluated
+NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
+RAYS_AT_ONCE = 4096
+POINTS_A_STAGE = 1200  # front to back; fewer would save samples and cost calls
+
+
+@final
+class AdaptiveRenderer(AbstractRenderer):
+    """Chooses samples for each ray by an estimate of the error.
+
+    Only the finest field is asked. Training (with a generator, or where gradients are kept) renders as the
+    culled renderer: the
+    samples must not depend on what is being learnt.
+
+    Args:
+        quadrature: As the culled renderer; used in training.
+        num_coarse: As the culled renderer; the count that what is left out is compared with.
+        num_fine: As the culled renderer.
+        hull_steps: Steps in which the occupied part of a ray is looked up.
+        memory_mib: Bound on what is held at once, MiB.
+        tolerance: Largest error of a colour that is asked for, in [0, 1].
+    """
+
+    def __init__(
+        self,
+        *,
+        quadrature: AbstractQuadrature,
+        num_coarse: int,
+        num_fine: int,
+        hull_steps: int,
+        memory_mib: float,
+        tolerance: float,
+    ) -> None:
+        super().__init__(
+            quadrature=quadrature,
+            num_coarse=num_coarse,
+            num_fine=num_fine,
+            hull_steps=hull_steps,
+            memory_mib=memory_mib,
+        )
+        self.tolerance = tolerance
+        self._culled = CulledRenderer(
+            quadrature=quadrature,
+            num_coarse=num_coarse,
+            num_fine=num_fine,
+            hull_steps=hull_steps,
+            memory_mib=memory_mib,
+        )
+
+    def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
+        """Render rays (R,) to the tolerance; with a generator or gradients as the culled renderer."""
+        if generator is not None or torch.is_grad_enabled():
+            return self._culled.render(scene, rays, generator)
+        index, near, far = _candidates(scene, rays)
+        block = max(64, min(RAYS_AT_ONCE, chunk_size(self.memory_mib) // 4))
+        blocks = [
+            self._render_block(scene, rays[index[i : i + block]], near[i : i + block], far[i : i + block])
+            for i in range(0, len(index), block)
+        ]
+        return self._gathered(blocks, index, rays)
+
+    def _render_block(self, scene: Scene, rays: RayBundle, near: Tensor, far: Tensor) -> "_Block":
+        """Render some rays (R,) between near and far (R,), m."""
+        ways = _ways(scene, rays, near, far, self.hull_steps)
+        samples = Samples(scene, rays, chunk_size(self.memory_mib))
+        s_edges, begins = segment_bins(ways.occupied, ways.t_edges.diff(dim=-1), SPACING, MAX_BINS)
+        numbers = self._first_samples(samples, ways, s_edges)
+        block = _Block.empty(rays, far, samples)
+        rows = torch.arange(len(near), device=near.device)
+        for round_ in range(MAX_ROUNDS + 1):
+            done, errors = self._compose(
+                block, rows, ways, s_edges, begins, numbers, last=round_ == MAX_ROUNDS
+            )
+            going = (~done).nonzero()[:, 0]
+            if len(going) == 0:
+                break
+            rows = rows[going]
+            split = split_bins(
+                s_edges[going], begins[going], errors[going], NUM_SPLIT, 0.1 * self.tolerance / NUM_SPLIT
+            )
+            kept = torch.where(split.source >= 0, numbers[going].gather(1, split.source.clamp_min(0)), -1)
+            s_edges, begins = split.s_edges, split.begins
+            wanted = (split.source < 0) & (s_edges.diff(dim=-1) > 0)
+            new = samples.add(rows, ways.t_vals(rows, _middles(s_edges)), wanted)
+            numbers = torch.where(wanted, new, kept)
+        return block
+
+    def _first_samples(self, samples: Samples, ways: "_Ways", s_edges: Tensor) -> Tensor:
+        """Evaluate the middles of bins front to back, until what lies behind can not be seen; numbers (R, K)."""
+        widths, t_vals = s_edges.diff(dim=-1), ways.t_vals(None, _middles(s_edges))
+        numbers = torch.full_like(widths, -1, dtype=torch.long)
+        light = torch.ones_like(widths[:, 0])
+        start = 0
+        while start < widths.shape[1]:
+            rows = (light > UNSEEN_SHARE * self.tolerance).nonzero()[:, 0]
+            if len(rows) == 0:
+                break
+            columns = slice(start, start + max(4, -(-POINTS_A_STAGE // len(rows))))
+            some = widths[rows, columns]
+            if not bool((some > 0).any()):
+                break
+            found = samples.add(rows, t_vals[rows, columns], some > 0)
+            numbers[rows, columns] = found
+            light[rows] *= torch.exp(-(samples.densities(found) * some).sum(-1))
+            start = columns.stop
+        return numbers
+
+    def _compose(
+        self,
+        block: "_Block",
+        rows: Tensor,
+        ways: "_Ways",
+        s_edges: Tensor,
+        begins: Tensor,
+        numbers: Tensor,
+        *,
+        last: bool,
+    ) -> tuple[Tensor, Tensor]:
+        """Composite rays by row, note those that are accurate enough, (r,) bool, and answer the errors of bins (r, K)."""
+        widths = s_edges.diff(dim=-1)
+        densities = block.samples.densities(numbers)
+        before, after = light_before(densities * widths)
+        rgb, known = block.samples.colours(
+            numbers, (numbers >= 0) & (before - after > COLOUR_SHARE * self.tolerance)
+        )
+        marched = march(densities, rgb, known, widths, begins, WHITE)
+        stopped = ((numbers < 0) & (widths > 0)).any(-1)
+        left = torch.where(stopped, after[:, -1], 0.0)
+        estimated = marched.errors.square().sum(-1).sqrt() + marched.unseen + left
+        done = (estimated <= self.tolerance) | last
+        finished = done.nonzero()[:, 0]
+        block.note(
+            rows[finished], marched, estimated, finished, ways.t_vals(rows, _middles(s_edges)), stopped
+        )
+        return done, marched.errors
+
+    def _gathered(self, blocks: list["_Block"], index: Tensor, rays: RayBundle) -> Rendering:
+        """Put blocks of candidate rays back among all rays (R,)."""
+        num_rays, device = rays.origins.shape[0], rays.origins.device
+        nothing = rays.origins.new_zeros(num_rays)
+        rgb, opacity, estimated = rays.origins.new_full((num_rays, 3), WHITE), nothing, nothing.clone()
+        depth = torch.full((num_rays,), float("nan"), device=device, dtype=nothing.dtype)
+        if blocks:
+            join = lambda name: torch.cat([getattr(block, name) for block in blocks])  # noqa: E731
+            rgb[index], opacity[index] = join("rgb"), join("opacity")
+            depth[index], estimated[index] = join("depth"), join("estimated")
+        evaluated = sum(len(block.samples) for block in blocks)
+        total = max(evaluated, num_rays * self.num_coarse)
+        used = sum(int(block.used.sum()) for block in blocks)
+        return Rendering(
+            finest=RenderOutput(rgb=rgb, opacity=opacity, depth=depth),
+            coarse=None,
+            left_out=LeftOut(
+                rays=num_rays - used, rays_of=num_rays, samples=total - evaluated, samples_of=total
+            ),
+            estimate=ErrorEstimate(
+                asked=self.tolerance,
+                estimated=estimated,
+                num_samples=evaluated,
+                num_colours=sum(block.samples.num_colours for block in blocks),
+                num_stopped=sum(int(block.stopped.sum()) for block in blocks),
+                num_unresolved=int((estimated > self.tolerance).sum()),
+            ),
+        )
+
+    def _evaluate(
+        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor
+    ) -> tuple[FieldOutput, int]:
+        """As the culled renderer."""
+        return self._culled._evaluate(field, points, dirs, inside)
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """The occupied parts of rays: t_edges (R, N + 1), m, occupied (R, N), occupied length up to each step's end (R, N), m."""
+
+    t_edges: Tensor
+    occupied: Tensor
+    reached: Tensor
+
+    def t_vals(self, rows: Tensor | None, s_vals: Tensor) -> Tensor:
+        """Distances (r, K) along rays by row of occupied lengths s_vals (r, K), m."""
+        chosen = self if rows is None else _Ways(self.t_edges[rows], self.occupied[rows], self.reached[rows])
+        step = torch.searchsorted(chosen.reached, s_vals.contiguous()).clamp_max(chosen.reached.shape[-1] - 1)
+        return chosen.t_edges.gather(-1, step + 1) - (chosen.reached.gather(-1, step) - s_vals)
+
+
+def _ways(scene: Scene, rays: RayBundle, near: Tensor, far: Tensor, num_steps: int) -> _Ways:
+    if scene.hull is None:
+        t_edges = torch.stack((near, far), dim=-1)
+        return _Ways(t_edges, torch.ones_like(near[:, None], dtype=torch.bool), (far - near)[:, None])
+    share = torch.linspace(0.0, 1.0, num_steps + 1, dtype=near.dtype, device=near.device)
+    t_edges = torch.addcmul(near[:, None], (far - near)[:, None], share)
+    occupied = occupied_at(scene.hull.occupancy, scene.hull, rays, 0.5 * (t_edges[:, 1:] + t_edges[:, :-1]))
+    return _Ways(t_edges, occupied, (t_edges.diff(dim=-1) * occupied).cumsum(-1))
+
+
+def _candidates(scene: Scene, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor]:
+    """Rays (R,) that may meet something: index, near and far."""
+    if scene.hull is not None:
+        found = candidates(scene.hull, rays)
+        return found.index, found.near, found.far
+    near, far = box_interval(rays, scene.box_min, scene.box_max)
+    index = (far > near).nonzero()[:, 0]
+    return index, near[index], far[index]
+
+
+def _middles(s_edges: Tensor) -> Tensor:
+    return 0.5 * (s_edges[:, 1:] + s_edges[:, :-1])
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Results of a block of rays, filled as rays are finished."""
+
+    rgb: Tensor
+    opacity: Tensor
+    depth: Tensor
+    estimated: Tensor
+    stopped: Tensor
+    used: Tensor
+    far: Tensor
+    samples: Samples
+
+    @classmethod
+    def empty(cls, rays: RayBundle, far: Tensor, samples: Samples) -> "_Block":
+        """Rays that meet nothing."""
+        no = torch.zeros_like(far, dtype=torch.bool)
+        zero = torch.zeros_like(far)
+        white = rays.origins.new_full((len(far), 3), WHITE)
+        return cls(white, zero, far.clone(), zero.clone(), no, no.clone(), far, samples)
+
+    def note(
+        self,
+        rows: Tensor,
+        marched: Marched,
+        estimated: Tensor,
+        chosen: Tensor,
+        t_vals: Tensor,
+        stopped: Tensor,
+    ) -> None:
+        """Write the results of chosen rays (r,) into rows (r,)."""
+        weights = marched.weights[chosen]
+        self.rgb[rows], self.opacity[rows] = marched.rgb[chosen], marched.opacity[chosen]
+        self.estimated[rows], self.stopped[rows] = estimated[chosen], stopped[chosen]
+        self.depth[rows] = expected_depth(weights, t_vals[chosen], self.far[rows])
+        self.used[rows] = (weights > 0).any(-1)

@@ -1,0 +1,126 @@
+"""Error of a ray's colour, estimated bin by bin, and bins split where it is made.
+
+Letters: R rays, K bins a ray, sample k at the centre of bin k, padded by bins of no width. The estimate is
+goal-oriented (dual
+weighted): what an error of a bin's optical depth does to the colour of the ray is the light that reaches
+the bin times the
+difference of the bin's colour from the light behind it.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from charnerf.volume.compositing import weights_from_optical_depths
+
+DENSITY_SHARE = 0.25  # of the jump to a neighbour's density, taken as the error of a bin's mean density
+COLOUR_SHARE = 0.25  # of the difference to a neighbour's colour, taken as the error of a bin's colour
+
+
+@dataclass(frozen=True)
+class Marched:
+    """Rays composited: colour (R, 3), opacity (R,), weights (R, K), errors of the bins (R, K) and what is left behind (R,)."""
+
+    rgb: Tensor
+    opacity: Tensor
+    weights: Tensor
+    errors: Tensor
+    unseen: Tensor
+
+
+def light_before(depths: Tensor) -> tuple[Tensor, Tensor]:
+    """Light before and after bins of optical depths (R, K), in [0, 1]."""
+    after = depths.cumsum(-1)
+    return torch.exp(depths - after), torch.exp(-after)
+
+
+def march(
+    densities: Tensor, rgb: Tensor, known: Tensor, widths: Tensor, begins: Tensor, background: float
+) -> Marched:
+    """Composite rays and estimate the error that each bin makes.
+
+    Args:
+        densities: (R, K), 1/m.
+        rgb: Colours (R, K, 3), read only where known.
+        known: Bins whose colour was evaluated, (R, K), bool; the light absorbed in the others counts as
+            having the mean colour
+            of the known ones, and is added to the estimate.
+        widths: Of the bins, (R, K), m; 0 pads.
+        begins: Bins that begin a segment of the hull, (R, K): before them the density is another one for a
+            known reason.
+        background: Colour behind everything.
+    """
+    depths = densities * widths
+    weights, passed = weights_from_optical_depths(depths)
+    seen = (weights * known)[..., None] * rgb
+    shown, opacity = seen.sum(1), weights.sum(-1)
+    counted = (weights * known).sum(-1)
+    unseen = opacity - counted
+    total = shown * (opacity / counted.clamp_min(1e-6))[:, None] + background * passed[:, None]
+    before, after = light_before(depths)
+    behind = ((total[:, None] - seen.cumsum(1)) / after[..., None].clamp_min(1e-4)).clamp(0.0, 1.0)
+    contrast = torch.where(known, (rgb - behind).abs().amax(-1), 1.0)
+    joined = (widths[:, 1:] > 0) & ~begins[:, 1:]  # bin k with k + 1
+    jump = _largest_step((densities[:, 1:] - densities[:, :-1]).abs() * joined)
+    alone = ~(_either_side(joined))
+    jump = torch.where(alone, densities, jump)
+    from_density = (before * after).sqrt() * contrast * (DENSITY_SHARE * jump * widths).clamp_max(1.0)
+    step = (rgb[:, 1:] - rgb[:, :-1]).abs().amax(-1) * (joined & known[:, 1:] & known[:, :-1])
+    from_colour = COLOUR_SHARE * weights * _largest_step(step)
+    return Marched(
+        rgb=total, opacity=opacity, weights=weights, errors=from_density + from_colour, unseen=unseen
+    )
+
+
+def _largest_step(steps: Tensor) -> Tensor:
+    """Larger of the steps (R, K - 1) on the two sides of each of K bins."""
+    padded = torch.nn.functional.pad(steps, (1, 1))
+    return torch.maximum(padded[:, :-1], padded[:, 1:])
+
+
+def _either_side(joined: Tensor) -> Tensor:
+    padded = torch.nn.functional.pad(joined, (1, 1))
+    return padded[:, :-1] | padded[:, 1:]
+
+
+@dataclass(frozen=True)
+class Split:
+    """Bins after splitting: s_edges (R, K' + 1), begins (R, K'), where each bin's sample was before (R, K'), -1 for new ones."""
+
+    s_edges: Tensor
+    begins: Tensor
+    source: Tensor
+
+
+def split_bins(s_edges: Tensor, begins: Tensor, errors: Tensor, num_split: int, least: float) -> Split:
+    """Cut the bins with the largest errors into three: the sample in the middle stays the middle of its bin.
+
+    Args:
+        s_edges: (R, K + 1), m.
+        begins: (R, K), bool.
+        errors: (R, K).
+        num_split: Bins cut a ray, at most.
+        least: Bins with a smaller error are not cut.
+    """
+    num_bins = errors.shape[-1]
+    values, chosen = errors.topk(min(num_split, num_bins), dim=-1)
+    cut = torch.zeros_like(begins).scatter(1, chosen, values > least)
+    pieces = torch.where(cut, 3, 1)
+    ends = pieces.cumsum(-1)
+    count = int(ends[:, -1].max())
+    number = torch.arange(count, device=ends.device).expand(len(ends), -1).contiguous()
+    parent = torch.searchsorted(ends, number, right=True)
+    beyond = parent >= num_bins
+    parent = parent.clamp_max(num_bins - 1)
+    piece = number - (ends - pieces).gather(1, parent)
+    low, high = s_edges.gather(1, parent), s_edges.gather(1, parent + 1)
+    parts = pieces.gather(1, parent)
+    start = torch.where(beyond, high, low + (high - low) * (piece / parts))
+    edges = torch.cat((start, s_edges[:, -1:]), dim=-1)
+    middle = ~beyond & ((parts == 1) | (piece == 1))
+    return Split(
+        s_edges=edges,
+        begins=begins.gather(1, parent) & (piece == 0) & ~beyond,
+        source=torch.where(middle, parent, -1),
+    )

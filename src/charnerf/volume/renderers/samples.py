@@ -1,0 +1,95 @@
+"""Samples of a block of rays: evaluated in chunks, densities at once, colours when asked for, each at most once.
+
+Letters: R rays, K samples a ray, M samples in all. A sample is known by its number, given in the order of
+evaluation; -1 is none.
+"""
+
+import torch
+from torch import Tensor
+
+from charnerf.types import DensityAnswer, RayBundle, Scene, TensorRecord
+from charnerf.volume.renderers.base import POINTS_AT_ONCE
+
+UNKNOWN = 0.5  # colour of samples that nobody asked for
+
+
+class Samples:
+    """What was evaluated on some rays.
+
+    Args:
+        scene: What is looked at.
+        rays: Rays (R,).
+        points_at_once: Points of one chunk.
+    """
+
+    def __init__(self, scene: Scene, rays: RayBundle, points_at_once: int) -> None:
+        self.scene = scene
+        self.rays = rays
+        self.size = min(points_at_once, POINTS_AT_ONCE)
+        self.num_colours = 0
+        self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
+        self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
+        self._known = torch.zeros(1, dtype=torch.bool, device=rays.origins.device)
+        self._answers: list[tuple[int, DensityAnswer]] = []
+
+    def __len__(self) -> int:
+        """Samples evaluated."""
+        return len(self._densities) - 1
+
+    def add(self, rows: Tensor, t_vals: Tensor, wanted: Tensor) -> Tensor:
+        """Evaluate densities of samples of some rays.
+
+        Args:
+            rows: Which rays, (r,).
+            t_vals: Their samples, (r, K), m.
+            wanted: Samples to evaluate, (r, K), bool.
+
+        Returns:
+            Numbers of the samples, (r, K); -1 where not wanted.
+        """
+        row, column = wanted.nonzero().unbind(-1)
+        ray = rows[row]
+        directions = self.rays.directions[ray]
+        points = torch.addcmul(self.rays.origins[ray], directions, t_vals[row, column, None])
+        start, found = len(self), []
+        for first in range(0, len(points), self.size):
+            some = slice(first, first + self.size)
+            answer = self.scene.answer_densities(points[some], directions[some])
+            self._answers.append((start + first, answer))
+            found.append(answer.densities)
+        count = len(points)
+        self._densities = torch.cat((self._densities[:-1], *found, self._densities[-1:]))
+        self._rgb = torch.cat((self._rgb[:-1], self._rgb.new_full((count + 1, 3), UNKNOWN)))
+        self._known = torch.cat((self._known[:-1], self._known.new_zeros(count + 1)))
+        numbers = torch.full_like(wanted, -1, dtype=torch.long)
+        numbers[row, column] = torch.arange(start, start + count, device=numbers.device)
+        return numbers
+
+    def densities(self, numbers: Tensor) -> Tensor:
+        """Densities of samples by number, zero for none."""
+        return self._densities[numbers]
+
+    def colours(self, numbers: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
+        """Colours (R, K, 3) of samples by number (R, K), those wanted evaluated if they were not; and which are known."""
+        missing = numbers[wanted & ~self._known[numbers]]
+        if len(missing):
+            missing = missing.sort().values
+            starts = torch.tensor([start for start, _ in self._answers], device=missing.device)
+            counts = torch.bincount(
+                torch.searchsorted(starts, missing, right=True) - 1, minlength=len(starts)
+            ).tolist()
+            groups = zip(self._answers, missing.split(counts), strict=True)
+            parts = [answer.state[group - start] for (start, answer), group in groups if len(group)]
+            self._rgb[missing] = self._evaluate(type(parts[0]).joined(parts), len(missing))
+            self._known[missing] = True
+            self.num_colours += len(missing)
+        return self._rgb[numbers], self._known[numbers]
+
+    def _evaluate(self, state: TensorRecord, count: int) -> Tensor:
+        """Colours (count, 3) of parts of answers, in chunks."""
+        colours = self._answers[0][1].colours
+        parts = [
+            colours(state[i : i + self.size] if count > self.size else state)
+            for i in range(0, count, self.size)
+        ]
+        return torch.cat(parts).to(self._rgb.dtype)
