@@ -16,6 +16,7 @@ LAYERS = (
     ("geometry",),
     ("models", "volume", "data", "losses"),
     (
+        "bench",
         "capture",
         "drawings",
         "evaluation",
@@ -26,7 +27,7 @@ LAYERS = (
         "stability",
         "training",
     ),
-    ("cli", "commands", "__main__", "__init__"),
+    ("cli", "cli_options", "commands", "__main__", "__init__"),
 )
 LAYER_OF = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may import one another
@@ -45,7 +46,7 @@ ONLY_IN = {  # foreign package: where it may be imported
     "hydra": ("config", "runs"),
     "omegaconf": ("config", "runs", "commands", "training/run", "training/finish"),
     "lightning": ("training", "data/datamodule"),
-    "typer": ("cli",),
+    "typer": ("cli", "cli_options"),
 }
 
 GLOBAL_SETTERS = {

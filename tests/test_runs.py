@@ -122,7 +122,7 @@ def test_a_checkpoint_from_elsewhere_can_not_run_code(
             return (Path.touch, (tmp_path / "owned",))
 
     folder = write_run(tmp_path / "run", network, cfg)
-    (folder / "checkpoints" / "last.ckpt").write_bytes(pickle.dumps({"state_dict": Evil()}))
+    (folder / "checkpoints" / "last.ckpt").write_bytes(pickle.dumps({"state_dict": Evil()}, protocol=2))
     with pytest.raises(DataError, match=r"last\.ckpt: can not be read as a checkpoint"):
         charnerf.load(folder)
     torch.save({"state_dict": Evil()}, folder / "checkpoints" / "last.ckpt")

@@ -1,0 +1,53 @@
+"""Options that several commands share: one name, one meaning, one help text."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+Weights = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="RUN_OR_WEIGHTS",
+        exists=True,
+        help="A run folder, a .ckpt or a .safetensors; the released weights if left out.",
+    ),
+]
+WeightsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--weights",
+        metavar="RUN_OR_WEIGHTS",
+        exists=True,
+        help="A run folder, a .ckpt or a .safetensors; the released weights if left out.",
+    ),
+]
+Dataset = Annotated[
+    Path,
+    typer.Option("--data", metavar="DATASET", exists=True, file_okay=False, help="Folder with dataset.json."),
+]
+Folder = Annotated[
+    Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="Folder to write to.")
+]
+NewDataset = Annotated[
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="DATASET", file_okay=False, help="Data set to write, or to add to."
+    ),
+]
+Device = Annotated[str, typer.Option(help="auto, cpu, cuda, cuda:1, ..: auto takes a GPU if there is one.")]
+Trusted = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust", metavar="MODULE", help="Module of your own classes that the run's config may name."
+    ),
+]
+Views = Annotated[
+    int, typer.Option(min=1, help="Target pictures a character, spread over the upper hemisphere.")
+]
+Size = Annotated[int, typer.Option(min=8, max=4096, help="Side of every picture, pixels.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; one a core if left out.")]
+Sources = Annotated[
+    Literal["orthographic", "pinhole"], typer.Option(help="Projection of the front, side and back views.")
+]
+Depth = Annotated[bool, typer.Option("--depth", help="Write depth pictures too (16 bit, mm).")]
