@@ -176,3 +176,10 @@ def test_a_hull_given_is_the_hull_used(person_views, person_hull):
     assert model.encode(person_views, person_hull).hull is person_hull
     carved = model.encode(person_views).hull
     assert torch.equal(carved.occupancy, person_hull.occupancy)
+
+
+def test_drawings_are_carved_in_their_own_precision_and_place(person_views):
+    """Batches are carved where the data is, whatever the model has been moved to."""
+    model = tiny_models.tiny_model()
+    hull = model.double().carve(person_views)
+    assert hull.box_min.dtype == torch.float32

@@ -88,7 +88,7 @@ class CharNeRF(nn.Module):
         """Hulls of drawings (B, V), for callers who keep them; None for a model without a hull."""
         if not self.has_hull:
             return None
-        box_min, box_max = self.box
+        box_min, box_max = (corner.to(views.images) for corner in self.box)  # data carves on its own device
         return build_hull(self.views(views), box_min=box_min, box_max=box_max)
 
     def encode(self, views: SourceViews, hull: Hull | None = None) -> EncodedViews:

@@ -16,6 +16,7 @@ from charnerf.data.validation import ValidationView
 from charnerf.losses.total import TERMS
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
+from charnerf.types import RenderOutput
 
 CURVE_COLUMNS = ("step", "phase", "seconds", "rays", "val_psnr", "val_psnr_foreground", "val_ssim", *TERMS)
 PICTURES = 4
@@ -131,9 +132,8 @@ class PictureLogger(L.Callback):
         with torch.no_grad():
             scene = pl_module.model.scene(pl_module.model.encode(batch.views, batch.hull), 0)
             output = pl_module.eval_renderer.render_camera(scene, batch.camera).finest
-        near, far = output.depth.min(), output.depth.max()
-        grey = ((far - output.depth) / (far - near).clamp_min(1e-6))[..., None].expand_as(output.rgb)
         opacity = output.opacity[..., None].expand_as(output.rgb)
+        grey = _nearness(output)[..., None].expand_as(output.rgb)
         pictures = [_on_white(batch.rgba), output.rgb, grey, opacity]
         drawings = [_on_white(image.permute(1, 2, 0)) for image in batch.views.images[0]]
         number = batch_idx // data
@@ -144,6 +144,15 @@ class PictureLogger(L.Callback):
 
 def _on_white(rgba: Tensor) -> Tensor:
     return rgba[..., :3] * rgba[..., 3:] + (1.0 - rgba[..., 3:])
+
+
+def _nearness(output: RenderOutput) -> Tensor:
+    """Depth as grey (H, W): what is seen from white, nearest, to grey; what shows nothing is black."""
+    seen = output.opacity > 0.5
+    if not bool(seen.any()):
+        return torch.zeros_like(output.depth)
+    near, far = output.depth[seen].min(), output.depth[seen].max()
+    return torch.where(seen, 1.0 - 0.75 * (output.depth - near) / (far - near).clamp_min(1e-6), 0.0)
 
 
 def _row(pictures: list[Tensor]) -> Tensor:
