@@ -36,4 +36,6 @@ def check_finite(name: str, tensor: Tensor) -> None:
     """
     bad = int((~tensor.isfinite()).sum())
     if bad:
-        raise NumericalError(f"{name}: found {bad} of {tensor.numel()} values not finite, expected finite numbers.")
+        raise NumericalError(
+            f"{name}: found {bad} of {tensor.numel()} values not finite, expected finite numbers."
+        )

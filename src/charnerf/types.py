@@ -326,7 +326,7 @@ class TrainBatch:
 
     def to(self, device: torch.device | str, *, non_blocking: bool = False) -> TrainBatch:
         """Return a copy whose tensors are on a device."""
-        moved = {
+        moved: dict[str, Any] = {
             field.name: value.to(device, non_blocking=non_blocking)
             for field in fields(self)
             if isinstance(value := getattr(self, field.name), Tensor | TensorRecord)

@@ -12,7 +12,7 @@ def _at(x: float, z: float) -> tuple[float, float]:
     return (x + MIDDLE) * SCALE, (MIDDLE + 1.0 - z) * SCALE
 
 
-def _box(draw, x0, z0, x1, z1, colour):  # noqa: PLR0917
+def _box(draw, x0, z0, x1, z1, colour):
     (left, bottom), (right, top) = _at(x0, z0), _at(x1, z1)
     draw.rectangle((left, top, right, bottom), fill=colour)
 

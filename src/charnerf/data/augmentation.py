@@ -66,7 +66,9 @@ class StretchAndRecolor(AbstractAugmentation):
         """Return the batch changed at random."""
         draws = torch.rand(4, generator=generator)
         if draws[0] < self.stretch_share and can_stretch(batch.views):
-            scales = torch.stack((_between(self.width_range, draws[1]), _between(self.depth_range, draws[2]), torch.ones(())))
+            scales = torch.stack(
+                (_between(self.width_range, draws[1]), _between(self.depth_range, draws[2]), torch.ones(()))
+            )
             batch = stretch(batch, scales, self.used_views(batch.views).cameras)
         if draws[3] < self.recolor_share:
             batch = recolor(batch, torch.randperm(3, generator=generator))

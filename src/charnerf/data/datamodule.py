@@ -67,5 +67,3 @@ class MixedDataModule(L.LightningDataModule):
 
 def _as_is(item: object) -> object:
     return item
-
-

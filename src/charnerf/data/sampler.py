@@ -71,8 +71,7 @@ class PhaseSampler(Sampler[BatchRequest]):
         now = self.position()
         stretch = self._stretch(now)
         while now.progress < 1.0 and self._stretch(now) <= stretch:
-            arguments = {"step": now.step, "seconds": now.seconds, "progress": now.progress}
-            index = self.schedule.index_at(**arguments)
+            index = self.schedule.index_at(step=now.step, seconds=now.seconds, progress=now.progress)
             phase = self.schedule.phases[index]
             yield BatchRequest(
                 step=now.step,

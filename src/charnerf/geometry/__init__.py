@@ -1,0 +1,1 @@
+"""Geometry as pure functions: cameras, rays, sampling, encoding, the visual hull."""

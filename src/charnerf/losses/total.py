@@ -52,7 +52,9 @@ class WeightedLosses:
     def __init__(self, *, weights: Mapping[str, float]) -> None:
         unknown = sorted(set(weights) - set(TERMS))
         if unknown:
-            raise ConfigError(f"loss.weights.{unknown[0]}: found an unknown term, expected one of {', '.join(TERMS)}.")
+            raise ConfigError(
+                f"loss.weights.{unknown[0]}: found an unknown term, expected one of {', '.join(TERMS)}."
+            )
         self.weights = dict(weights)
 
     def active(self, overrides: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -72,11 +74,13 @@ class WeightedLosses:
             if values:
                 terms[term] = sum(values[1:], start=values[0])
         weights = self.active(batch.loss_weights)
-        total = sum((weights[term] * value for term, value in terms.items()), start=passes[0].rays.rgb.new_zeros(()))
+        total = sum(
+            (weights[term] * value for term, value in terms.items()), start=passes[0].rays.rgb.new_zeros(())
+        )
         return total, terms
 
 
-def _term(term: str, one: PassOutput, batch: TrainBatch) -> Tensor | None:
+def _term(term: str, one: PassOutput, batch: TrainBatch) -> Tensor | None:  # noqa: PLR0911 (one line a term)
     """One unweighted term of one pass; None where its data is missing (a character without a mesh)."""
     match term:
         case "reconstruction":

@@ -55,6 +55,8 @@ class CharNeRF(nn.Module):
     Source: paper, Overview.
     """
 
+    box_centre: Tensor
+
     def __init__(
         self,
         *,
@@ -82,7 +84,7 @@ class CharNeRF(nn.Module):
     @property
     def box(self) -> tuple[Tensor, Tensor]:
         """Lower and upper corner of the space looked at, (3,) each, m."""
-        return self.box_centre - self.box_half_extent, self.box_centre + self.box_half_extent  # type: ignore[operator]
+        return self.box_centre - self.box_half_extent, self.box_centre + self.box_half_extent
 
     def carve(self, views: SourceViews) -> Hull | None:
         """Hulls of drawings (B, V), for callers who keep them; None for a model without a hull."""

@@ -15,6 +15,7 @@ from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.report import write_run_report
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
+from charnerf.meshing.extract import vertex_colours
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -67,12 +68,12 @@ def finish_run(
         built = build_mesh(scene, sources, resolution=MESH_RESOLUTION)
     (folder / "meshes").mkdir(exist_ok=True)
     save_mesh(built.mesh, folder / "meshes" / f"{first}.glb")
-    if isinstance(trainer.logger, TensorBoardLogger):
-        colors = np.asarray(built.mesh.visual.vertex_colors)[None, :, :3].copy()
+    colours = vertex_colours(built.mesh)
+    if isinstance(trainer.logger, TensorBoardLogger) and colours is not None:
         trainer.logger.experiment.add_mesh(
             f"mesh/{first}",
             vertices=torch.from_numpy(np.asarray(built.mesh.vertices, dtype=np.float32)[None]),
-            colors=torch.from_numpy(colors),
+            colors=torch.from_numpy(colours[None, :, :3].copy()),
             faces=torch.from_numpy(np.asarray(built.mesh.faces, dtype=np.int64)[None]),
             global_step=trainer.global_step,
         )

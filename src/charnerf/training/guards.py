@@ -31,7 +31,12 @@ class FiniteGuard(L.Callback):
         self.folder = folder
 
     def on_train_batch_end(
-        self, trainer: L.Trainer, pl_module: L.LightningModule, outputs: Any, batch: TrainBatch, batch_idx: int
+        self,
+        trainer: L.Trainer,
+        pl_module: L.LightningModule,
+        outputs: Any,
+        batch: TrainBatch,
+        batch_idx: int,
     ) -> None:
         """Look at the loss of the step just done."""
         loss = outputs["loss"] if isinstance(outputs, dict) else outputs

@@ -75,11 +75,17 @@ class TrainingModule(L.LightningModule):
         loss, terms = self.losses(passes, batch)
         self.last_opacity = _seen_opacity(passes[0].rays.opacity.detach(), batch.alpha)
         now = self.position()
-        logged = {f"train/loss/{term}": value.detach() for term, value in terms.items()}
+        logged: dict[str, Tensor | float] = {
+            f"train/loss/{term}": value.detach() for term, value in terms.items()
+        }
         logged |= {"train/loss/total": loss.detach(), "train/opacity_foreground": self.last_opacity}
         logged |= {"train/rays": float(batch.alpha.numel()), "train/phase": float(batch.phase)}
         points = 0 if batch.surface is None else batch.surface.points[..., 0].numel()
-        logged |= {"train/surface_points": float(points), "train/seconds": now.seconds, "train/lr": self._rate()}
+        logged |= {
+            "train/surface_points": float(points),
+            "train/seconds": now.seconds,
+            "train/lr": self._rate(),
+        }
         self.log_dict(logged, batch_size=1)
         return loss
 
@@ -90,13 +96,18 @@ class TrainingModule(L.LightningModule):
         active = self.losses.active(batch.loss_weights)
         surface_rgb = surface_alpha = space_alpha = None
         if batch.surface is not None and not active.keys().isdisjoint({"surface_rgb", "surface_alpha"}):
-            answers = [field(p, torch.zeros_like(p)) for field, p in zip(fields, batch.surface.points, strict=True)]
+            answers = [
+                field(p, torch.zeros_like(p)) for field, p in zip(fields, batch.surface.points, strict=True)
+            ]
             surface_rgb = torch.stack([answer.rgb for answer in answers])
             densities = torch.stack([answer.densities for answer in answers])
             surface_alpha = alphas_from_densities(densities, torch.full_like(densities, self.surface_delta))
         if batch.space is not None and "occupancy" in active:
             densities = torch.stack(
-                [field(p, torch.zeros_like(p)).densities for field, p in zip(fields, batch.space.points, strict=True)]
+                [
+                    field(p, torch.zeros_like(p)).densities
+                    for field, p in zip(fields, batch.space.points, strict=True)
+                ]
             )
             space_alpha = alphas_from_densities(densities, torch.full_like(densities, SPACE_DELTA))
         rays = RenderOutput(
@@ -104,7 +115,9 @@ class TrainingModule(L.LightningModule):
             opacity=torch.stack([o.opacity for o in outputs]),
             depth=torch.stack([o.depth for o in outputs]),
         )
-        return PassOutput(rays=rays, surface_rgb=surface_rgb, surface_alpha=surface_alpha, space_alpha=space_alpha)
+        return PassOutput(
+            rays=rays, surface_rgb=surface_rgb, surface_alpha=surface_alpha, space_alpha=space_alpha
+        )
 
     def validation_step(self, view: ValidationView, batch_idx: int) -> None:
         """Render one picture of a validation character and measure it."""

@@ -206,7 +206,9 @@ def find_checkpoint(ckpt_path: str | None, folder: Path) -> Path | None:
     if ckpt_path != "last":
         if Path(ckpt_path).is_file():
             return Path(ckpt_path).resolve()
-        raise ConfigError(f"ckpt_path: found {ckpt_path!r}, which is no file; expected a .ckpt, `last` or null.")
+        raise ConfigError(
+            f"ckpt_path: found {ckpt_path!r}, which is no file; expected a .ckpt, `last` or null."
+        )
     own = folder / "checkpoints" / "last.ckpt"
     others = sorted(folder.parent.glob("*/checkpoints/last.ckpt"), key=lambda path: path.stat().st_mtime)
     if own.is_file():

@@ -1,0 +1,1 @@
+"""Volume rendering: compositing, quadrature, renderers; takes functions, knows no model."""

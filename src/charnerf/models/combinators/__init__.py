@@ -1,1 +1,1 @@
-
+"""Combinators H: one file, one class, one option."""

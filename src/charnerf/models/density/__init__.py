@@ -1,1 +1,1 @@
-
+"""How directions enter: wirings of f1, H and f2."""

@@ -1,1 +1,1 @@
-
+"""Encoders E: one file, one class, one option."""

@@ -1,1 +1,1 @@
-
+"""What f1 reads beside the encoder."""

@@ -1,1 +1,1 @@
-
+"""Colour heads."""

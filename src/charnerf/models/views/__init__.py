@@ -1,1 +1,1 @@
-
+"""Which views the model conditions on."""

@@ -3,6 +3,7 @@
 from typing import final
 
 import torch
+from torch import Tensor
 
 from charnerf.geometry.cameras import mirror_cameras
 from charnerf.models.views.base import AbstractViews
@@ -28,13 +29,17 @@ class MirroredSide(AbstractViews):
         side = views[:, columns]
         flipped = mirror_cameras(side.cameras)
         cameras = views.cameras
+
+        def appended(name: str) -> Tensor:
+            return torch.cat((getattr(cameras, name), getattr(flipped, name)), dim=1)
+
         return SourceViews(
             images=torch.cat((views.images, side.images.flip(-1)), dim=1),
             cameras=Cameras(
-                *(
-                    torch.cat((getattr(cameras, name), getattr(flipped, name)), dim=1)
-                    for name in ("world_from_camera", "focal", "principal_point", "orthographic")
-                ),
+                world_from_camera=appended("world_from_camera"),
+                focal=appended("focal"),
+                principal_point=appended("principal_point"),
+                orthographic=appended("orthographic"),
                 width=cameras.width,
                 height=cameras.height,
             ),

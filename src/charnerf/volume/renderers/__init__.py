@@ -1,0 +1,1 @@
+"""Renderers: one file, one class, one option."""
