@@ -44,6 +44,11 @@ class RunClock(L.Callback):
         self._done_seconds = self.seconds
         self._running_since = None
 
+    def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """A run that goes on from its own end has nothing to do: without batches no batch would stop it."""
+        if self.position().progress >= 1.0:
+            trainer.should_stop = True
+
     def on_train_epoch_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Go on counting."""
         self._running_since = time.perf_counter()
