@@ -1,5 +1,6 @@
 """What follows training: test figures, a mesh, the report."""
 
+import logging
 from pathlib import Path
 
 import lightning as L
@@ -20,6 +21,7 @@ from charnerf.models.charnerf import CharNeRF
 from charnerf.types import Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
+log = logging.getLogger(__name__)
 MESH_RESOLUTION = 128
 
 
@@ -78,4 +80,10 @@ def finish_run(
             global_step=trainer.global_step,
         )
         trainer.logger.finalize("success")
-    write_run_report(folder)
+    report = write_run_report(folder)
+    beside = metrics["baselines"]["visual_hull"]
+    log.info(
+        "Test: %.2f dB, %.2f dB on the foreground, SSIM %.3f (visual hull: %.2f, %.2f, %.3f). Report: %s",
+        *(found[key] for found in (metrics, beside) for key in ("psnr", "psnr_foreground", "ssim")),
+        report,
+    )

@@ -40,6 +40,7 @@ class BudgetBar(L.Callback):
         total = self.clock.budget_steps if by_steps else self.clock.budget_seconds
         self.bar = tqdm(
             total=round(total or 0),
+            initial=self.clock.steps if by_steps else round(self.clock.seconds),  # of a resumed run
             desc="training",
             unit="step" if by_steps else "s",
             bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} {unit}, left {remaining}{postfix}",
@@ -87,7 +88,10 @@ class CurveWriter(L.Callback):
         def read(name: str) -> float | str:
             return float(metrics[name]) if name in metrics else ""
 
-        row: dict[str, float | int | str] = {"step": self.clock.steps, "seconds": round(self.clock.seconds, 3)}
+        row: dict[str, float | int | str] = {
+            "step": self.clock.steps,
+            "seconds": round(self.clock.seconds, 3),
+        }
         row |= {"phase": read("train/phase"), "rays": read("train/rays")}
         row |= {name: read(f"val/{name[4:]}") for name in ("val_psnr", "val_psnr_foreground", "val_ssim")}
         row |= {term: read(f"train/loss/{term}") for term in TERMS}

@@ -43,6 +43,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         folder: The run folder (design: On disk); made if it is missing.
     """
     keep_freed_memory()
+    logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)  # the bar and the report say the rest
     L.seed_everything(cfg.seed, verbose=False)
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
@@ -70,7 +71,8 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     with warnings.catch_warnings():
         # the loaders are fed from memory, one request at a time: more workers would not help
         warnings.filterwarnings("ignore", message=".*does not have many workers.*")
-        warnings.filterwarnings("ignore", message=".*`IterableDataset` has `__len__` defined.*")
+        warnings.filterwarnings("ignore", message=".*LeafSpec.*", category=DeprecationWarning)
+        warnings.filterwarnings("ignore", message=".*LeafSpec.*", category=FutureWarning)
         trainer.fit(module, datamodule=data, ckpt_path=checkpoint, weights_only=checkpoint is not None)
     if trainer.is_global_zero:
         save_weights(folder / "weights.safetensors", model, cfg)
