@@ -138,18 +138,18 @@ def test_new_residual_blocks_are_the_identity():
 
 def test_image_hull_features_by_hand():
     readings = ViewReadings(
-        source_rgb=torch.tensor((((0.0, 0.5, 1.0),),)),
-        behind=torch.tensor(((0.1,),)),
-        edge=torch.tensor(((-0.02,),)),
-        source_dirs=torch.tensor((((0.0, 1.0, 0.0),),)),
-        mirrored=torch.tensor((1.0,)),
+        source_rgb=torch.tensor((((0.0, 0.5, 1.0), (0.0, 0.0, 0.0)),)),
+        behind=torch.tensor(((0.1, 0.0),)),
+        edge=torch.tensor(((-0.02, 0.01),)),  # the smallest that counts is the second: the first is mirrored
+        source_dirs=torch.tensor((((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),)),
+        mirrored=torch.tensor((1.0, 0.0)),
     )
-    numbers = torch.tanh(torch.tensor((0.4, 2.0, 8.0, -0.16, -0.8, -3.2)))
+    numbers = torch.tanh(torch.tensor((0.4, 2.0, 8.0, -0.16, -0.8, -3.2, 0.08, 0.4, 1.6)))
     expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))
     features = ImageHullFeatures()
     torch.testing.assert_close(features(readings)[0, 0], expected)
-    assert features.num_extras == 13
-    assert ImageFeatures()(readings).shape == (1, 1, 0) and ImageFeatures().num_extras == 0
+    assert features.num_extras == 16
+    assert ImageFeatures()(readings).shape == (1, 2, 0) and ImageFeatures().num_extras == 0
 
 
 def test_the_mirrored_side_of_a_symmetric_figure_is_its_picture_from_270():
