@@ -15,7 +15,7 @@ EDGE_SCALES = (8.0, 40.0, 160.0)  # per picture side
 class ImageHullFeatures(AbstractFeatures):
     """Where the point lies with respect to the hull, by view and over all views, at three scales each.
 
-    By view: signed depth behind the hull's front, distance to the mask's edge; colour, direction, mirrored flag. Over all views: the
+    By view: signed depth behind the hull's front, distance to the mask's edge; colour, direction, mirrored flag. Over all: the
     smallest edge distance, because a point is empty as soon as one drawing says so, which an average over views can not tell;
     mirrored views have no say in it.
     """
