@@ -27,6 +27,7 @@ LAYERS = (
         "stability",
         "training",
     ),
+    ("bench",),
     ("cli", "cli_options", "commands", "__main__", "__init__"),
 )
 LAYER_OF = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

@@ -318,6 +318,58 @@ def check(
         raise typer.Exit(FAILED)
 
 
+@app.command(epilog=DEBUG_NOTE)
+def bench(
+    weights: Weights = None,
+    *,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only the headline; under five minutes on two cores.")
+    ] = False,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", dir_okay=False, help="Write all numbers there.")
+    ] = None,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For plots and tables."),
+    ] = Path("outputs/bench"),
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data",
+            metavar="DATASET",
+            exists=True,
+            file_okay=False,
+            help="Data set of the characters; embedded ones if left out.",
+        ),
+    ] = None,
+    split: Annotated[str, typer.Option(metavar="NAME", help="Split of the data set.")] = "test",
+    roofline: Annotated[
+        bool, typer.Option("--roofline", help="Only the arithmetic against the machine's peak.")
+    ] = False,
+    memory: Annotated[float, typer.Option(min=64, help="Memory budget, MiB.")] = 2048,
+    device: Device = "auto",
+    trust: Trusted = None,
+) -> None:
+    """Measure error against run time: speed-ups over a pixelNeRF-like evaluation, and what they cost.
+
+    Prints tables; DIR gets plots, bench.json and bench.md.
+    """
+    from charnerf import commands
+
+    commands.bench(
+        weights,
+        output,
+        quick=quick,
+        roofline=roofline,
+        json_file=json_file,
+        data=data,
+        split=split,
+        memory_mib=memory,
+        device=device,
+        trust=trust or [],
+    )
+
+
 def main() -> None:
     """Run a command and leave with its exit status."""
     sys.exit(run(sys.argv[1:]))

@@ -32,6 +32,7 @@ LIGHTS = {"unlit": Unlit, "headlight": Headlight}
 RENDERERS = {
     "culled": "charnerf.volume.renderers.culled.CulledRenderer",
     "dense": "charnerf.volume.renderers.dense.DenseRenderer",
+    "adaptive": "charnerf.volume.renderers.adaptive.AdaptiveRenderer",
 }
 
 
@@ -215,6 +216,35 @@ def reconstruct(
 def report(folder: Path) -> None:
     """Write the report over all runs below a folder."""
     say(f"report: {write_folder_report(folder)}")
+
+
+def bench(
+    weights: Path | None,
+    output: Path,
+    *,
+    quick: bool,
+    roofline: bool,
+    json_file: Path | None,
+    data: Path | None,
+    split: str,
+    memory_mib: float,
+    device: str,
+    trust: Sequence[str],
+) -> None:
+    """Measure error against run time."""
+    from charnerf.bench import run as benchmark
+
+    model = load_model(weights, device=device, trust=trust)
+    setting = {"data": data, "split": split, "memory_mib": memory_mib, "say": say}
+    if roofline:
+        result = benchmark.run_roofline(model, **setting)  # type: ignore[arg-type]
+    elif quick:
+        result = benchmark.run_quick(model, **setting)  # type: ignore[arg-type]
+    else:
+        result = benchmark.run_full(model, output, **setting)  # type: ignore[arg-type]
+    if json_file is not None:
+        benchmark.write_json(json_file, result)
+    sys.stdout.write(benchmark.summary(result) + "\n")
 
 
 CHECKED_SIZE = 48  # pixels: each one is a ray of its own

@@ -1,0 +1,86 @@
+"""Peak memory of a large picture and a large mesh, each in a fresh process: what ran before hides nothing."""
+
+from __future__ import annotations
+
+import multiprocessing
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import torch
+
+from charnerf.bench.subjects import Pictured
+from charnerf.evaluation.timing import Stopwatch, process_peak_mib
+from charnerf.geometry.cameras import pixel_centres
+from charnerf.meshing.build import build_mesh
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import Cameras
+from charnerf.volume.renderers.base import AbstractRenderer
+
+Work = Literal["render", "mesh"]
+
+
+@dataclass(frozen=True)
+class PeakMemory:
+    """Rise of resident memory over the loaded, encoded model, MiB, and the seconds that the work took."""
+
+    rise_mib: float
+    seconds: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return dict(vars(self))
+
+
+def peak_memory(
+    work: Work, network: CharNeRF, renderer: AbstractRenderer, pictured: Pictured, *, size: int
+) -> PeakMemory:
+    """Render a picture of size x size pixels, or make a mesh of a grid of size points a side, in a process of its own.
+
+    On a CUDA device: in this process, by the allocator's own peak.
+    """
+    device = network.box[0].device
+    task = (work, network, renderer, pictured, size, torch.get_num_threads())
+    if device.type == "cuda":
+        return _measure(*task)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(_measure, task)
+
+
+def _measure(
+    work: Work,
+    network: CharNeRF,
+    renderer: AbstractRenderer,
+    pictured: Pictured,
+    size: int,
+    threads: int,
+) -> PeakMemory:
+    torch.set_num_threads(threads)
+    device = network.box[0].device
+    views = pictured.views.to(device)
+    with torch.no_grad():
+        scene = network.scene(network.encode(views), 0)
+        camera = resized(pictured.camera.to(device), size)
+        renderer.render_camera(scene, resized(camera, 16))  # what is allocated once is no part of it
+    with Stopwatch(device) as watch:
+        with watch.stage("before"):
+            pixel_centres(4, 4)
+        before = watch.peaks_mib().get("before", process_peak_mib())
+        with watch.stage("work"), torch.no_grad():
+            if work == "render":
+                renderer.render_camera(scene, camera)
+            else:
+                build_mesh(scene, views, resolution=size)
+        peak = watch.peaks_mib().get("work", process_peak_mib())
+    return PeakMemory(rise_mib=peak - before, seconds=watch.total_seconds("work"))
+
+
+def resized(camera: Cameras, size: int) -> Cameras:
+    """The same view with size x size pixels."""
+    factor = size / max(camera.width, camera.height)
+    return replace(
+        camera,
+        focal=camera.focal * factor,
+        principal_point=camera.principal_point * factor,
+        width=size,
+        height=size,
+    )

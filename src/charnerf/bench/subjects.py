@@ -1,0 +1,205 @@
+"""What is rendered in a benchmark: characters encoded once, the rays of random pixels, the truth and the converged reference."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+import trimesh
+from torch import Tensor
+
+from charnerf.bench.baseline import PixelAligned
+from charnerf.bench.kinds import KINDS
+from charnerf.capture.embree import CaptureOptions, capture_character
+from charnerf.capture.procedural.character import make_character
+from charnerf.capture.procedural.dataset import character_seed
+from charnerf.data.characters import load_character
+from charnerf.data.layout import names_of, read_dataset
+from charnerf.geometry.cameras import pixel_centres, pixel_rays
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import Cameras, RayBundle, Scene, SourceViews
+from charnerf.volume.quadrature import PiecewiseConstant
+from charnerf.volume.renderers.dense import DenseRenderer
+
+REFERENCE_SAMPLES = 1024
+REFERENCE_STEPS = 1024  # in which the reference looks up the hull
+TARGET_VIEWS = 6  # captured for each subject; the last one looked at
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One character as the benchmark sees it.
+
+    Attributes:
+        name: Its name.
+        kind: Kind of scene.
+        network: The network that it is rendered by.
+        views: Its drawings, B = 1.
+        scene: Its field.
+        maps: The same for the baseline.
+        camera: Of the target picture, shape ().
+        rays: Of the random pixels of that picture, (R,).
+        truth: Their colours on white, (R, 3).
+    """
+
+    name: str
+    kind: str
+    network: CharNeRF
+    views: SourceViews
+    scene: Scene
+    maps: PixelAligned
+    camera: Cameras
+    rays: RayBundle
+    truth: Tensor
+
+
+@dataclass(frozen=True)
+class Pictured:
+    """Drawings (B = 1), the camera of one target picture and that picture, (H, W, 4) in [0, 1]."""
+
+    name: str
+    views: SourceViews
+    camera: Cameras
+    picture: Tensor
+
+
+def embedded(count: int, size: int) -> list[Pictured]:
+    """Characters of the embedded generator's test split (seed 0)."""
+    return [
+        captured(f"test-{index:05d}", make_character(character_seed(0, "test", index)), size)
+        for index in range(count)
+    ]
+
+
+def captured(name: str, scene: trimesh.Scene, size: int) -> Pictured:
+    """Capture a character in the world frame."""
+    pictures = capture_character(scene, CaptureOptions(views=TARGET_VIEWS, size=size)).pictures
+    drawings = torch.from_numpy(pictures.source_images).permute(0, 3, 1, 2)[None].float() / 255.0
+    present = torch.ones(drawings.shape[:2], dtype=torch.bool)
+    views = SourceViews(drawings, pictures.source_cameras[None].to(torch.float32), present, ~present)
+    picture = torch.from_numpy(pictures.images[-1]).float() / 255.0
+    return Pictured(name, views, pictures.cameras[TARGET_VIEWS - 1].to(torch.float32), picture)
+
+
+def of_dataset(root: Path, split: str, count: int) -> list[Pictured]:
+    """The first characters of a split of a data set."""
+    found = []
+    for name in names_of(read_dataset(root), split)[:count]:
+        character = load_character(root, name)
+        view = character.cameras.shape[0] // 2
+        picture = character.images([view])[0].float() / 255.0
+        found.append(Pictured(name, character.sources, character.cameras[view], picture))
+    return found
+
+
+def subject(pictured: Pictured, network: CharNeRF, *, kind: str, num_pixels: int, seed: int = 0) -> Subject:
+    """Encode a character and choose random pixels of its target picture.
+
+    Args:
+        pictured: Drawings and target.
+        network: The network.
+        kind: Kind of scene.
+        num_pixels: Pixels drawn without replacement; all where there are fewer.
+        seed: Of the draw.
+    """
+    device = network.box[0].device
+    views, camera = pictured.views.to(device), pictured.camera.to(device)
+    with torch.no_grad():
+        encoded = network.encode(views)
+        scene = network.scene(encoded, 0)
+    pixels = pixel_centres(camera.width, camera.height, device=device).reshape(-1, 2)
+    generator = torch.Generator().manual_seed(seed)
+    chosen = torch.randperm(len(pixels), generator=generator)[:num_pixels].to(device)
+    alpha = pictured.picture[..., 3:]
+    truth = (pictured.picture[..., :3] * alpha + 1.0 - alpha).reshape(-1, 3).to(device)[chosen]
+    return Subject(
+        name=pictured.name,
+        kind=kind,
+        network=network,
+        views=views,
+        scene=scene,
+        maps=PixelAligned.of(encoded),
+        camera=camera,
+        rays=pixel_rays(camera, pixels[chosen]),
+        truth=truth,
+    )
+
+
+def subjects_by_kind(network: CharNeRF, untrained: CharNeRF, *, size: int, num_pixels: int) -> list[Subject]:
+    """One subject of each kind of scene; fog is what an untrained field of the same build answers."""
+    found = []
+    for kind, build in KINDS.items():
+        pictured = captured(kind, build(), size)
+        if kind == "empty picture":
+            pictured = _looking_away(pictured)
+        used = untrained if kind == "fog" else network
+        found.append(subject(pictured, used, kind=kind, num_pixels=num_pixels))
+    return found
+
+
+def _looking_away(pictured: Pictured) -> Pictured:
+    """The camera turned round: nothing is in its picture."""
+    pose = pictured.camera.world_from_camera.clone()
+    pose[:3, 0], pose[:3, 2] = -pose[:3, 0], -pose[:3, 2]
+    return replace(
+        pictured,
+        camera=replace(pictured.camera, world_from_camera=pose),
+        picture=torch.ones_like(pictured.picture),
+    )
+
+
+def untrained_like(network: CharNeRF, seed: int = 0) -> CharNeRF:
+    """A network of the same build with seeded weights that were never trained."""
+    fresh = copy.deepcopy(network)
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for name, parameter in fresh.named_parameters():
+            if parameter.ndim < 2:
+                parameter.fill_(1.0 if "norm" in name and name.endswith("weight") else 0.0)
+            else:
+                scale = (2.0 / parameter[0].numel()) ** 0.5
+                parameter.copy_(scale * torch.randn(parameter.shape, generator=generator).to(parameter))
+    return fresh
+
+
+@torch.no_grad()
+def reference(subject_: Subject) -> Tensor:
+    """Colours (R, 3), float64, of the converged integral: dense, float64, 1024 samples on every ray that meets the hull."""
+    network = copy.deepcopy(subject_.network).double()
+    encoded = network.encode(subject_.views.to(torch.float64), _hull64(subject_))
+    scene = network.scene(encoded, 0)
+    renderer = DenseRenderer(
+        quadrature=PiecewiseConstant(),
+        num_coarse=REFERENCE_SAMPLES,
+        num_fine=REFERENCE_SAMPLES,
+        hull_steps=REFERENCE_STEPS,
+        memory_mib=256,
+    )
+    rays = subject_.rays.to(torch.float64)
+    met = (renderer._occupied(scene, rays).length > 0).nonzero()[:, 0]
+    rgb = torch.ones_like(rays.origins)
+    for part in met.split(64):
+        rgb[part] = renderer.render(scene, rays[part]).finest.rgb
+    return rgb
+
+
+def _hull64(subject_: Subject) -> object:
+    """The same hull, so that both precisions integrate over the same cells."""
+    hull = subject_.scene.hull
+    if hull is None:
+        return None
+    return replace(hull, **{name: value[None] for name, value in vars(hull).items()}).to(torch.float64)
+
+
+def pixels_psnr(rgb: Tensor, truth: Tensor) -> float:
+    """PSNR of colours (R, 3) of random pixels, dB."""
+    error = (rgb.double() - truth.double()).square().mean().clamp_min(1e-10)
+    return float(-10.0 * torch.log10(error))
+
+
+def worst(values: Sequence[float]) -> float:
+    """Largest of some errors."""
+    return max(values) if values else 0.0
