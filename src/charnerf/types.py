@@ -1,6 +1,7 @@
 """Frozen records that travel between the parts: fields, moves and indexing; no maths.
 
-Letters: B characters, V source views, R rays, S samples a ray, P points, H W image height and width, G grid cells a side.
+Letters: B characters, V source views, R rays, S samples a ray, P points, H W image height and width, G
+grid cells a side.
 Frames (design): world in metres, +Z up, facing -Y; cameras OpenGL/Blender (+X right, +Y up, look along -Z).
 """
 
@@ -133,10 +134,12 @@ class Hull(TensorRecord):
         occupancy: (B, G, G, G), bool, indexed x, y, z.
         box_min: (B, 3), metres, lower corner of the grid.
         box_max: (B, 3), metres, upper corner.
-        front_depths: (B, V, H, W), metres along the source camera's ray to the first occupied cell; NaN-free: where the ray
+        front_depths: (B, V, H, W), metres along the source camera's ray to the first occupied cell;
+            NaN-free: where the ray
             misses, the depth of the box's centre.
         edge_distances: (B, V, H, W), pixels from the mask's edge: positive inside, negative outside.
-        dilations: (B, V), pixels by which each mask was dilated (widened further where the drawings disagree).
+        dilations: (B, V), pixels by which each mask was dilated (widened further where the drawings
+            disagree).
     """
 
     occupancy: Tensor
@@ -165,7 +168,8 @@ class DensityAnswer:
 
     Attributes:
         densities: (P,), 1/m.
-        state: What colours of the points (P) are made of; parts of it are taken by index, parts of several answers of one field
+        state: What colours of the points (P) are made of; parts of it are taken by index, parts of several
+            answers of one field
             are joined.
         colours: From such a part (Q,) to colours (Q, 3).
     """
@@ -191,6 +195,10 @@ class Scene:
         box_max: Upper corner, (3,), m.
         density_sees_directions: Whether densities depend on the query direction.
         densities_first: The finest field in two steps; None where it answers all at once.
+        coarse_hull: The hull's occupancy pooled and dilated (see geometry/occupied.py), kept for renderers
+            that look there first.
+        bytes_a_point: Memory that the field takes for a point while it answers, bytes; chunks are bounded
+            by it.
     """
 
     coarse: FieldFunction
@@ -200,6 +208,8 @@ class Scene:
     box_max: Tensor
     density_sees_directions: bool
     densities_first: DensityFunction | None = None
+    coarse_hull: Tensor | None = None
+    bytes_a_point: int = 16_384
 
     def answer_densities(self, points: Tensor, view_dirs: Tensor) -> DensityAnswer:
         """Densities of the finest field at points (P, 3), its colours on demand; in two steps where it can."""
@@ -303,9 +313,11 @@ class TrainBatch:
         rays: Target rays (B, R).
         rgb: Their colours on white, (B, R, 3).
         alpha: Their alpha, (B, R).
-        depth: Distance along the ray to the surface, (B, R), m, 0 where there is none; None where no loss reads it.
+        depth: Distance along the ray to the surface, (B, R), m, 0 where there is none; None where no loss
+            reads it.
         surface: Points on the surface, or None where no loss reads them or a character has no mesh.
-        space: Points in the hull labelled inside or outside by the silhouettes, or None where no loss reads them.
+        space: Points in the hull labelled inside or outside by the silhouettes, or None where no loss
+            reads them.
         phase: Index of the schedule's phase.
         loss_weights: Weights that the phase overrides, by term.
         step: Index of the batch, from 0; seeds everything random in it.

@@ -124,7 +124,7 @@ def test_chunks_change_nothing(person_scene, kind):
     with torch.no_grad():
         whole = renderer(kind, memory_mib=1024).render(scene, rays)
         pieces = renderer(kind, memory_mib=1).render(replace(scene, coarse=counted), rays)
-    assert len(sizes) > 1 and max(sizes) <= chunk_size(1) == 256
+    assert len(sizes) > 1 and max(sizes) <= chunk_size(1, scene.bytes_a_point)
     for name in ("rgb", "opacity", "depth"):
         torch.testing.assert_close(
             getattr(pieces.finest, name), getattr(whole.finest, name), atol=1e-5, rtol=1e-5

@@ -43,7 +43,7 @@ def coarse_occupancy(occupancy: Tensor) -> Tensor:
     return pooled
 
 
-def candidates(hull: Hull, rays: RayBundle) -> Candidates:
+def candidates(hull: Hull, coarse: Tensor, rays: RayBundle) -> Candidates:
     """Rays (R,) that may meet the hull, and the part of each that may; conservative.
 
     A ray that touches an occupied coarse cell stays in the cells around it for at least 2/side of its way
@@ -51,10 +51,10 @@ def candidates(hull: Hull, rays: RayBundle) -> Candidates:
     that equal steps of at most that length can not miss the dilated cells.
 
     Args:
-        hull: One character's hull, its grid a multiple of 4 a side and at most 32 * 4.
+        hull: One character's hull.
+        coarse: Its `coarse_occupancy`.
         rays: Rays (R,).
     """
-    coarse = coarse_occupancy(hull.occupancy)
     parts = [
         _candidates(coarse, hull, rays[i : i + RAYS_AT_ONCE], i)
         for i in range(0, max(1, rays.origins.shape[0]), RAYS_AT_ONCE)

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from charnerf.errors import ShapeError
 from charnerf.geometry.encoding import positional_encoding
 from charnerf.geometry.hull import build_hull
+from charnerf.geometry.occupied import coarse_occupancy
 from charnerf.models.encoders.base import AbstractEncoder
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
@@ -19,6 +20,7 @@ from charnerf.models.view_maps import ViewMaps
 from charnerf.models.views.base import AbstractViews
 from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
 
+BYTES_A_FEATURE = 64  # of a view and a point, gradient kept: some 16 tensors of float32; measured, generous
 HULL_DEPTH_FADE = 20.0  # per half-extent: a point this share behind the hull's front counts as hidden by 1/e
 
 
@@ -49,7 +51,8 @@ class CharNeRF(nn.Module):
         fine: The field of the fine pass, or None where the configuration has none.
         num_frequencies: nu of eq. 1.
         box_centre: Centre of the space looked at, m, 3 numbers.
-        box_half_extent: Half of its side, m; coordinates are scaled by it before eq. 1, so that they stay in (-1, 1).
+        box_half_extent: Half of its side, m; coordinates are scaled by it before eq. 1, so that they stay
+            in (-1, 1).
         hull: Whether the visual hull belongs to the model.
 
     Source: paper, Overview.
@@ -156,6 +159,8 @@ class CharNeRF(nn.Module):
             box_max=box_max,
             density_sees_directions=self.coarse.density.sees_directions,
             densities_first=densities,
+            coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
+            bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
         )
 
     def _inputs(

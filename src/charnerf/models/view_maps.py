@@ -96,7 +96,7 @@ class ViewMaps:
         cameras, leading = self.cameras, (points.shape[0], self.cameras.shape[0])
         pixels, depth, in_front = project_into_all(cameras, points)
         size = pixels.new_tensor((cameras.width, cameras.height))
-        valid = in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)
+        valid = ((pixels >= 0) & (pixels <= size)).all(-1) & in_front
         scale = pixels.new_tensor(self.map_size) / size
         indices, weights = bilinear_rows(pixels * scale, width=self.map_size[0], height=self.map_size[1])
         read = read_rows(latents, indices, weights * valid.reshape(-1, 1))

@@ -13,7 +13,7 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.geometry.occupied import candidates, occupied_at, segment_bins
+from charnerf.geometry.occupied import candidates, coarse_occupancy, occupied_at, segment_bins
 from charnerf.geometry.rays import box_interval
 from charnerf.types import (
     ErrorEstimate,
@@ -38,7 +38,7 @@ UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque 
 COLOUR_SHARE = 0.05  # of the tolerance: weight from which on a sample's colour is evaluated
 NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
 RAYS_AT_ONCE = 4096
-POINTS_A_STAGE = 1200  # front to back; fewer would save samples and cost calls
+POINTS_A_STAGE = 2048  # front to back; fewer would save samples and cost calls
 
 
 @final
@@ -89,7 +89,7 @@ class AdaptiveRenderer(AbstractRenderer):
         if generator is not None or torch.is_grad_enabled():
             return self._culled.render(scene, rays, generator)
         index, near, far = _candidates(scene, rays)
-        block = max(64, min(RAYS_AT_ONCE, chunk_size(self.memory_mib) // 4))
+        block = max(64, min(RAYS_AT_ONCE, chunk_size(self.memory_mib, scene.bytes_a_point) // 4))
         blocks = [
             self._render_block(scene, rays[index[i : i + block]], near[i : i + block], far[i : i + block])
             for i in range(0, len(index), block)
@@ -99,7 +99,7 @@ class AdaptiveRenderer(AbstractRenderer):
     def _render_block(self, scene: Scene, rays: RayBundle, near: Tensor, far: Tensor) -> "_Block":
         """Render some rays (R,) between near and far (R,), m."""
         ways = _ways(scene, rays, near, far, self.hull_steps)
-        samples = Samples(scene, rays, chunk_size(self.memory_mib))
+        samples = Samples(scene, rays, chunk_size(self.memory_mib, scene.bytes_a_point))
         s_edges, begins = segment_bins(ways.occupied, ways.t_edges.diff(dim=-1), SPACING, MAX_BINS)
         numbers = self._first_samples(samples, ways, s_edges)
         block = _Block.empty(rays, far, samples)
@@ -201,10 +201,10 @@ class AdaptiveRenderer(AbstractRenderer):
         )
 
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor
+        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
     ) -> tuple[FieldOutput, int]:
         """As the culled renderer."""
-        return self._culled._evaluate(field, points, dirs, inside)
+        return self._culled._evaluate(field, points, dirs, inside, chunk)
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,9 @@ def _ways(scene: Scene, rays: RayBundle, near: Tensor, far: Tensor, num_steps: i
 def _candidates(scene: Scene, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor]:
     """Rays (R,) that may meet something: index, near and far."""
     if scene.hull is not None:
-        found = candidates(scene.hull, rays)
+        coarse = scene.coarse_hull
+        coarse = coarse_occupancy(scene.hull.occupancy) if coarse is None else coarse
+        found = candidates(scene.hull, coarse, rays)
         return found.index, found.near, found.far
     near, far = box_interval(rays, scene.box_min, scene.box_max)
     index = (far > near).nonzero()[:, 0]

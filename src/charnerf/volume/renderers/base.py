@@ -1,7 +1,9 @@
 """From rays to colours: samples on the occupied part of each ray, quadrature, a fine pass where there is a fine field.
 
-Samples are placed in the arc length `s` along the occupied steps of a ray, which runs from 0 to the occupied length: outside the
-hull the density is zero by definition, so that the integral over s is the integral over the ray. Without a hull the whole
+Samples are placed in the arc length `s` along the occupied steps of a ray, which runs from 0 to the
+occupied length: outside the
+hull the density is zero by definition, so that the integral over s is the integral over the ray. Without a
+hull the whole
 interval in the box counts.
 """
 
@@ -126,7 +128,8 @@ class AbstractRenderer(ABC):
         inside = (seen.length > 0)[:, None].expand_as(t_vals)
         if scene.hull is not None:
             inside = inside & hull_contains(scene.hull, points)
-        answer, evaluated = self._evaluate(field, points, dirs, inside)
+        chunk = min(chunk_size(self.memory_mib, scene.bytes_a_point), POINTS_AT_ONCE)
+        answer, evaluated = self._evaluate(field, points, dirs, inside, chunk)
         weights, _ = self.quadrature.weights(answer.densities, s_vals, self._edges(seen, s_vals))
         far = seen.t_edges[:, -1]
         output = RenderOutput(
@@ -139,9 +142,12 @@ class AbstractRenderer(ABC):
 
     @abstractmethod
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor
+        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
     ) -> tuple[FieldOutput, int]:
-        """Answers at samples (R, S, 3), zero density where not inside (R, S); and how many were evaluated."""
+        """Answers at samples (R, S, 3), zero density where not inside (R, S); and how many were evaluated.
+
+        At most `chunk` points are evaluated at once.
+        """
 
     def _edges(self, seen: OccupiedRays, s_vals: Tensor) -> Tensor:
         """Bins of samples in occupied length, (R, S + 1)."""
@@ -158,9 +164,8 @@ class AbstractRenderer(ABC):
         t_edges, occupied = occupied_edges(scene.hull, rays, self.hull_steps)
         return OccupiedRays(rays, t_edges, occupied, (torch.diff(t_edges, dim=-1) * occupied).sum(-1))
 
-    def _in_chunks(self, field: FieldFunction, points: Tensor, dirs: Tensor) -> FieldOutput:
-        """Answers at points (P, 3), a chunk at a time."""
-        size = min(chunk_size(self.memory_mib), POINTS_AT_ONCE)
+    def _in_chunks(self, field: FieldFunction, points: Tensor, dirs: Tensor, size: int) -> FieldOutput:
+        """Answers at points (P, 3), a chunk of that size at a time."""
         parts = [field(points[i : i + size], dirs[i : i + size]) for i in range(0, len(points), size)]
         if not parts:
             return FieldOutput(rgb=torch.zeros_like(points), densities=torch.zeros_like(points[:, 0]))
@@ -174,12 +179,11 @@ class AbstractRenderer(ABC):
 POINTS_AT_ONCE = (
     4096  # more leave the caches: 8192 cost as much a point, 16384 nearly twice (two cores of a server)
 )
-BYTES_A_POINT = 16_384  # what a point may take with four views at width 64, gradient kept; measured, generous
 
 
-def chunk_size(memory_mib: float) -> int:
+def chunk_size(memory_mib: float, bytes_a_point: int = 16_384) -> int:
     """Points a chunk within a memory budget, at least 256."""
-    return max(256, int(memory_mib * 2**20 / BYTES_A_POINT))
+    return max(256, int(memory_mib * 2**20 / bytes_a_point))
 
 
 def _joined(estimates: list[ErrorEstimate], shape: tuple[int, int]) -> ErrorEstimate | None:

@@ -29,11 +29,11 @@ class CulledRenderer(AbstractRenderer):
         )
 
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor
+        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
     ) -> tuple[FieldOutput, int]:
         """Pack the samples inside, evaluate them, and put them back among zeros."""
         packed = inside.reshape(-1).nonzero()[:, 0]
-        answer = self._in_chunks(field, points.reshape(-1, 3)[packed], dirs.reshape(-1, 3)[packed])
+        answer = self._in_chunks(field, points.reshape(-1, 3)[packed], dirs.reshape(-1, 3)[packed], chunk)
         total = inside.numel()
         rgb = answer.rgb.new_zeros(total, 3).index_copy(0, packed, answer.rgb)
         densities = answer.densities.new_zeros(total).index_copy(0, packed, answer.densities)

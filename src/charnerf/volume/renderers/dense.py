@@ -21,9 +21,9 @@ class DenseRenderer(AbstractRenderer):
         )
 
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor
+        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
     ) -> tuple[FieldOutput, int]:
         """Evaluate all samples, then set the density outside to zero."""
-        answer = self._in_chunks(field, points.reshape(-1, 3), dirs.reshape(-1, 3))
+        answer = self._in_chunks(field, points.reshape(-1, 3), dirs.reshape(-1, 3), chunk)
         densities = answer.densities.reshape(inside.shape) * inside
         return FieldOutput(rgb=answer.rgb.reshape(points.shape), densities=densities), inside.numel()
