@@ -56,9 +56,9 @@ class PixelAligned:
 class PixelNeRFLike:
     """Renders rays by evaluating everything.
 
-    A network with one field is asked once for each of the 64 + 32 samples (the authors' code asks twice
-    for the first 64, of two
-    networks); one with two fields as there: the coarse one at 64, the fine one at all 96.
+    The coarse field is asked at 64 samples, then the fine one, or the same again where a network has but
+    one field, at all 96:
+    so do the authors, whose fine pass asks the first 64 anew.
 
     Args:
         network: The trained network.
@@ -82,15 +82,8 @@ class PixelNeRFLike:
         edges = edges_from_t_vals(coarse, near, far)
         drawn = importance_t_vals(edges, weights.detach(), self.num_fine, generator)
         t_vals = merge_t_vals(coarse, drawn)
-        if self.network.fine is not None:
-            answer = self._ask(self.network.fine, maps, rays, t_vals)
-        else:
-            more = self._ask(self.network.coarse, maps, rays, drawn)
-            order = torch.cat((coarse, drawn), dim=-1).argsort(dim=-1)
-            answer = FieldOutput(
-                rgb=torch.cat((answer.rgb, more.rgb), 1).gather(1, order[..., None].expand(-1, -1, 3)),
-                densities=torch.cat((answer.densities, more.densities), 1).gather(1, order),
-            )
+        fine = self.network.coarse if self.network.fine is None else self.network.fine
+        answer = self._ask(fine, maps, rays, t_vals)
         widths = edges_from_t_vals(t_vals, near, far).diff(dim=-1)
         weights, _ = weights_from_densities(answer.densities, widths)
         return RenderOutput(

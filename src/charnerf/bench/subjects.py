@@ -26,6 +26,7 @@ from charnerf.volume.renderers.dense import DenseRenderer
 
 REFERENCE_SAMPLES = 1024
 REFERENCE_STEPS = 1024  # in which the reference looks up the hull
+STARTS_AT_ZERO = ("second.weight", "score.weight")  # as the layers themselves start
 TARGET_VIEWS = 6  # captured for each subject; the last one looked at
 
 
@@ -157,7 +158,7 @@ def untrained_like(network: CharNeRF, seed: int = 0) -> CharNeRF:
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         for name, parameter in fresh.named_parameters():
-            if parameter.ndim < 2:
+            if parameter.ndim < 2 or name.endswith(STARTS_AT_ZERO):
                 parameter.fill_(1.0 if "norm" in name and name.endswith("weight") else 0.0)
             else:
                 scale = (2.0 / parameter[0].numel()) ** 0.5

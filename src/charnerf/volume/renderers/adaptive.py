@@ -32,7 +32,7 @@ from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.refinement import Marched, light_before, march, split_bins
 from charnerf.volume.renderers.samples import Samples
 
-SPACING = 0.04  # m: longest bin at the start; no feature of a field read from drawings is much thinner
+SPACING = 0.03  # m: longest bin at the start; no feature of a field read from drawings is much thinner
 MAX_BINS = 128  # of a ray at the start
 UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque surface
 COLOUR_SHARE = 0.05  # of the tolerance: weight from which on a sample's colour is evaluated

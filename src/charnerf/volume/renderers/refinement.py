@@ -14,8 +14,8 @@ from torch import Tensor
 
 from charnerf.volume.compositing import weights_from_optical_depths
 
-DENSITY_SHARE = 0.25  # of the jump to a neighbour's density, taken as the error of a bin's mean density
-COLOUR_SHARE = 0.25  # of the difference to a neighbour's colour, taken as the error of a bin's colour
+DENSITY_SHARE = 0.15  # of the jump to a neighbour's density, taken as the error of a bin's mean density
+COLOUR_SHARE = 0.2  # of the difference to a neighbour's colour, taken as the error of a bin's colour
 
 
 @dataclass(frozen=True)
