@@ -83,7 +83,7 @@ def test_culled_equals_dense_in_value_and_gradient(person_scene, fine, hull, jit
     for kind in (CulledRenderer, DenseRenderer):
         model, scene = person_scene(fine=fine, hull=hull)
         if jitter:
-            hits = renderer()._occupied(scene, rays).length > 0
+            hits = renderer().occupied(scene, rays).length > 0
             chosen = rays[hits.nonzero()[:, 0]]
         else:
             chosen = rays
@@ -150,7 +150,7 @@ def test_what_is_left_out_is_counted_right(person_scene):
     one = renderer()
     with torch.no_grad():
         left_out = one.render(counted, rays).left_out
-    missed = int((one._occupied(scene, rays).length == 0).sum())
+    missed = int((one.occupied(scene, rays).length == 0).sum())
     assert left_out.rays == missed > 0 and left_out.rays_of == 256
     assert left_out.samples_of == 256 * (12 + 12 + 10)
     assert left_out.samples == left_out.samples_of - sum(evaluated)

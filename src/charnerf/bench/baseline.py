@@ -28,7 +28,7 @@ from charnerf.models.inputs import PointInputs
 from charnerf.types import FieldOutput, Hull, RayBundle, RenderOutput, SourceViews
 from charnerf.volume.compositing import composite, expected_depth, weights_from_densities
 
-POINTS_AT_ONCE = 50_000  # pixelNeRF's evaluation batch
+POINTS_AT_ONCE = 100_000  # pixelNeRF's evaluation batch
 NUM_COARSE, NUM_FINE = 64, 32  # its samples a ray
 
 
@@ -98,7 +98,7 @@ class PixelNeRFLike:
         dirs = rays.directions[:, None].expand_as(points).reshape(-1, 3)
         flat = points.reshape(-1, 3)
         parts = [
-            self._evaluate(field, maps, flat[i : i + POINTS_AT_ONCE], dirs[i : i + POINTS_AT_ONCE])
+            self.evaluate(field, maps, flat[i : i + POINTS_AT_ONCE], dirs[i : i + POINTS_AT_ONCE])
             for i in range(0, len(flat), POINTS_AT_ONCE)
         ]
         densities = torch.cat([part.densities for part in parts]).reshape(t_vals.shape)
@@ -108,7 +108,7 @@ class PixelNeRFLike:
             rgb=torch.cat([part.rgb for part in parts]).reshape(points.shape), densities=densities
         )
 
-    def _evaluate(self, field: Field, maps: PixelAligned, points: Tensor, view_dirs: Tensor) -> FieldOutput:
+    def evaluate(self, field: Field, maps: PixelAligned, points: Tensor, view_dirs: Tensor) -> FieldOutput:
         """Colour and density of points (P, 3): every map read in every view, every linear map at every point."""
         cameras = maps.views.cameras
         pixels, depth, in_front = project(cameras[:, None], points[None])  # (V, P, ..)

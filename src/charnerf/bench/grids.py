@@ -55,12 +55,12 @@ def grid_share(subject: Subject, *, cells: int, num_cameras: int) -> GridShare:
         num_cameras: Cameras whose directions the density is averaged over.
     """
     start = time.perf_counter()
-    sparse = _sampler(subject, cells, num_cameras)
+    sparse = grid_sampler(subject, cells, num_cameras)
     level = choose_level(sparse.evaluate_coarse(4), subject.views).chosen.level
     grid = sparse.evaluate_surface(level)
     mesh = extract_surface(grid, level).mesh
     middle = time.perf_counter()
-    full = _sampler(subject, cells, num_cameras)
+    full = grid_sampler(subject, cells, num_cameras)
     other = extract_surface(full.evaluate_all(), level).mesh
     end = time.perf_counter()
     equal = mesh.faces.shape == other.faces.shape and bool(np.array_equal(mesh.faces, other.faces))
@@ -83,7 +83,7 @@ def hausdorff(first: trimesh.Trimesh, second: trimesh.Trimesh) -> float:
     return float(max(there, back))
 
 
-def _sampler(subject: Subject, cells: int, num_cameras: int) -> GridSampler:
+def grid_sampler(subject: Subject, cells: int, num_cameras: int) -> GridSampler:
     """A grid over the hull's box with cells of CUBE_SIDE / cells."""
     probe = GridSampler(subject.scene, resolution=16, num_cameras=num_cameras)
     longest = probe.spacing * 13  # a sampler lays resolution - 3 cells along the longest side

@@ -28,6 +28,7 @@ class Workbench:
     Attributes:
         network: The trained network.
         wide: A network of width 512 with seeded weights.
+        like: Arguments that every renderer takes.
         renderers: culled, adaptive and dense, in evaluation.
         training: culled and dense with the training's number of samples.
         batch_rays: Rays of a training step.
@@ -37,6 +38,7 @@ class Workbench:
 
     network: CharNeRF
     wide: CharNeRF
+    like: dict[str, Any]
     renderers: dict[str, AbstractRenderer]
     training: dict[str, AbstractRenderer]
     batch_rays: int
@@ -161,7 +163,7 @@ def how(bench: Workbench, count: int, arithmetic: Roofline) -> dict[str, str]:
         "render_speedup_culled": f"median over characters of the baseline's median seconds over renderer=culled's, {pixels}, "
         "in turns in one process; the baseline is the same network evaluated as pixelNeRF does: 64 samples a ray over the "
         "whole box, then these and 32 more (as its authors' code, also with one network: 160 evaluations; asking none twice would "
-        "take 0.6 of its time), all views, grid_sample, linear maps at each point, 50,000 points at once",
+        "take 0.6 of its time), all views, grid_sample, linear maps at each point, 100,000 points at once",
         "render_speedup_adaptive": f"the same with renderer=adaptive, renderer.tolerance={tolerance}",
         "render_psnr_loss_db": "PSNR of the baseline minus that of adaptive against the truth, on these pixels; median over "
         "characters; negative where adaptive is nearer to the truth",

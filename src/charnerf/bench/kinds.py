@@ -21,7 +21,8 @@ WHITE = (255, 255, 255)
 
 
 def _coloured(mesh: trimesh.Trimesh, color: Color) -> trimesh.Trimesh:
-    mesh.visual.vertex_colors = np.tile(np.array([*color, 255], np.uint8), (len(mesh.vertices), 1))
+    colors = np.tile(np.array([*color, 255], np.uint8), (len(mesh.vertices), 1))
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=colors)
     return mesh
 
 

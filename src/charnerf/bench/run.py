@@ -8,9 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from charnerf.bench.headline import quick
-from charnerf.bench.subjects import embedded, of_dataset
-from charnerf.bench.tables import comparison_table, headline_table
+from charnerf.bench.everything import all_sweeps
+from charnerf.bench.headline import ADAPTIVE, CULLED, NUM_PIXELS, quick
+from charnerf.bench.report import report
+from charnerf.bench.roofline import roofline
+from charnerf.bench.subjects import Pictured, embedded, of_dataset, subject
+from charnerf.bench.tables import comparison_table, headline_table, markdown
 from charnerf.bench.workbench import workbench
 from charnerf.evaluation.environment import environment
 from charnerf.model_api import Model
@@ -41,14 +44,58 @@ def run_quick(
         say(f"{time.perf_counter() - start:6.1f} s  {text}")
 
     tell("capturing")
-    size = model.image_size
-    pictured = embedded(NUM_CHARACTERS, size) if data is None else of_dataset(data, split, NUM_CHARACTERS)
+    pictured = _characters(model, data, split, NUM_CHARACTERS)
     result = quick(workbench(model, memory_mib=memory_mib), pictured, tell)
     tell("done")
     result["environment"] = environment(model.device)
     result["weights"] = model.source.name
     result["seconds"] = time.perf_counter() - start
     return result
+
+
+def run_roofline(
+    model: Model,
+    *,
+    data: Path | None,
+    split: str,
+    memory_mib: float,
+    say: Callable[[str], None],
+) -> dict[str, Any]:
+    """Measure arithmetic against the machine's peak: the model's own width, and 512; arguments as `run_quick`."""
+    bench = workbench(model, memory_mib=memory_mib)
+    pictured = _characters(model, data, split, 1)[0]
+    found = {}
+    for name, network in (("own width", bench.network), ("width 512", bench.wide)):
+        one = subject(pictured, network, kind=name, num_pixels=NUM_PIXELS)
+        for method in (CULLED, ADAPTIVE):
+            say(f"{name}, {method}")
+            found[f"{name}, {method}"] = roofline(one, bench.renderers[method]).as_dict()
+    return {"roofline": found, "environment": environment(model.device), "weights": model.source.name}
+
+
+def run_full(
+    model: Model,
+    output: Path,
+    *,
+    data: Path | None,
+    split: str,
+    memory_mib: float,
+    say: Callable[[str], None],
+) -> dict[str, Any]:
+    """Measure the headline and all sweeps; plots, bench.json and bench.md go to `output`; arguments as `run_quick`."""
+    result = run_quick(model, data=data, split=split, memory_mib=memory_mib, say=say)
+    bench = workbench(model, memory_mib=memory_mib)
+    pictured = _characters(model, data, split, NUM_CHARACTERS)
+    result |= all_sweeps(model, bench, pictured, output, say)
+    write_json(output / "bench.json", result)
+    (output / "bench.md").write_text(report(result), encoding="utf-8")
+    return result
+
+
+def _characters(model: Model, data: Path | None, split: str, count: int) -> list[Pictured]:
+    if data is None:
+        return embedded(count, model.image_size)
+    return of_dataset(data, split, count)
 
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
@@ -60,13 +107,20 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
 
 
 def summary(result: dict[str, Any]) -> str:
-    """The tables of a quick run as text."""
+    """The tables of a run as text."""
     machine = result["environment"]
-    return "\n\n".join(
-        (
+    parts = []
+    if "headline" in result:
+        parts += [
             headline_table(result["headline"]),
             comparison_table(result["characters"]),
             comparison_table([{**one, "name": one["kind"]} for one in result["kinds"]]),
-            f"{machine['machine']}, {machine['threads']} threads, torch {machine['torch']}, {machine['device']}",
-        )
+        ]
+    else:
+        names = ("share", "achieved_gflops", "peak_gflops", "gflop", "seconds")
+        rows = [(name, *(found[key] for key in names)) for name, found in result["roofline"].items()]
+        parts.append(markdown(("rendering", *names), rows))
+    parts.append(
+        f"{machine['machine']}, {machine['threads']} threads, torch {machine['torch']}, {machine['device']}"
     )
+    return "\n\n".join(parts)

@@ -20,7 +20,7 @@ from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.models.charnerf import CharNeRF
-from charnerf.types import Cameras, RayBundle, Scene, SourceViews
+from charnerf.types import Cameras, Hull, RayBundle, Scene, SourceViews
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.dense import DenseRenderer
 
@@ -170,7 +170,7 @@ def untrained_like(network: CharNeRF, seed: int = 0) -> CharNeRF:
 def reference(subject_: Subject) -> Tensor:
     """Colours (R, 3), float64, of the converged integral: dense, float64, 1024 samples on every ray that meets the hull."""
     network = copy.deepcopy(subject_.network).double()
-    encoded = network.encode(subject_.views.to(torch.float64), _hull64(subject_))
+    encoded = network.encode(subject_.views.to(torch.float64), hull_in_float64(subject_))
     scene = network.scene(encoded, 0)
     renderer = DenseRenderer(
         quadrature=PiecewiseConstant(),
@@ -180,14 +180,14 @@ def reference(subject_: Subject) -> Tensor:
         memory_mib=256,
     )
     rays = subject_.rays.to(torch.float64)
-    met = (renderer._occupied(scene, rays).length > 0).nonzero()[:, 0]
+    met = (renderer.occupied(scene, rays).length > 0).nonzero()[:, 0]
     rgb = torch.ones_like(rays.origins)
     for part in met.split(64):
         rgb[part] = renderer.render(scene, rays[part]).finest.rgb
     return rgb
 
 
-def _hull64(subject_: Subject) -> object:
+def hull_in_float64(subject_: Subject) -> Hull | None:
     """The same hull, so that both precisions integrate over the same cells."""
     hull = subject_.scene.hull
     if hull is None:

@@ -33,6 +33,7 @@ def workbench(model: Model, *, memory_mib: float, tolerance: float = TOLERANCE) 
     return Workbench(
         network=model.network,
         wide=resized_network(model, WIDE),
+        like=like,
         renderers={
             CULLED: CulledRenderer(**like),
             ADAPTIVE: AdaptiveRenderer(**like, tolerance=tolerance),

@@ -134,7 +134,7 @@ class CharNeRF(nn.Module):
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
         answer = partial(
-            self._inputs,
+            self.point_inputs,
             maps=ViewMaps.of(views, hull, present, (maps.shape[-1], maps.shape[-2])),
             mirrored=views.mirrored.to(maps.dtype),
         )
@@ -163,7 +163,7 @@ class CharNeRF(nn.Module):
             bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
         )
 
-    def _inputs(
+    def point_inputs(
         self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor
     ) -> PointInputs:
         """What a field sees of points (P, 3) looked at along view_dirs (P, 3)."""

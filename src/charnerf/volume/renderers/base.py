@@ -73,6 +73,7 @@ class AbstractRenderer(ABC):
         self.num_fine = num_fine
         self.hull_steps = hull_steps
         self.memory_mib = memory_mib
+        self.points_at_once = POINTS_AT_ONCE
 
     @abstractmethod
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
@@ -128,7 +129,7 @@ class AbstractRenderer(ABC):
         inside = (seen.length > 0)[:, None].expand_as(t_vals)
         if scene.hull is not None:
             inside = inside & hull_contains(scene.hull, points)
-        chunk = min(chunk_size(self.memory_mib, scene.bytes_a_point), POINTS_AT_ONCE)
+        chunk = min(chunk_size(self.memory_mib, scene.bytes_a_point), self.points_at_once)
         answer, evaluated = self._evaluate(field, points, dirs, inside, chunk)
         weights, _ = self.quadrature.weights(answer.densities, s_vals, self._edges(seen, s_vals))
         far = seen.t_edges[:, -1]
@@ -156,7 +157,7 @@ class AbstractRenderer(ABC):
             return seen.length[:, None] * share
         return edges_from_t_vals(s_vals, torch.zeros_like(seen.length), seen.length)
 
-    def _occupied(self, scene: Scene, rays: RayBundle) -> OccupiedRays:
+    def occupied(self, scene: Scene, rays: RayBundle) -> OccupiedRays:
         """Where rays (R,) may meet something."""
         if scene.hull is None:
             near, far = box_interval(rays, scene.box_min, scene.box_max)

@@ -15,7 +15,7 @@ class CulledRenderer(AbstractRenderer):
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,); those that miss are white without any work."""
-        occupied = self._occupied(scene, rays)
+        occupied = self.occupied(scene, rays)
         hit = (occupied.length > 0).nonzero()[:, 0]
         num_rays, missed = len(occupied.length), len(occupied.length) - len(hit)
         finest, coarse, left_out = self._two_passes(scene, occupied.take(hit), generator)

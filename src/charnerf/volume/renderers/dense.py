@@ -15,7 +15,7 @@ class DenseRenderer(AbstractRenderer):
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,), all of them."""
-        finest, coarse, left_out = self._two_passes(scene, self._occupied(scene, rays), generator)
+        finest, coarse, left_out = self._two_passes(scene, self.occupied(scene, rays), generator)
         return Rendering(
             finest=finest, coarse=coarse, left_out=left_out + LeftOut(rays=0, rays_of=rays.origins.shape[0])
         )

@@ -1,0 +1,114 @@
+"""Seconds of networks of other builds, with seeded weights: what each option costs, and the sizes of the paper and of pixelNeRF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import torch
+
+from charnerf import runs
+from charnerf.bench.baseline import PixelNeRFLike
+from charnerf.bench.headline import ADAPTIVE, CULLED
+from charnerf.bench.measure import in_turns
+from charnerf.bench.rendering import BASELINE
+from charnerf.bench.subjects import Pictured, subject, untrained_like
+from charnerf.bench.training_step import batch_of, parameters_of, step_timings
+from charnerf.config.composition import compose_config
+from charnerf.models.charnerf import CharNeRF
+from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.culled import CulledRenderer
+from charnerf.volume.renderers.dense import DenseRenderer
+
+BUILDS = {
+    "default": (),
+    "encoder=single": ("encoder=single",),
+    "combinator=mean": ("combinator=mean",),
+    "combinator=sa": ("combinator=sa",),
+    "combinator=view_mha": ("combinator=view_mha",),
+    "experiment=charnerf": ("experiment=charnerf",),
+}
+PIXELNERF = (
+    "experiment=no_mha_depth",
+    "model.width=512",
+    "model.num_single_view_blocks=3",
+    "model.num_multi_view_blocks=2",
+)
+NUM_RAYS = 64  # of the large networks
+
+
+def network_of(overrides: Sequence[str]) -> tuple[CharNeRF, Any]:
+    """A network of a composed config with seeded weights, and the config."""
+    cfg = compose_config(list(overrides))
+    return untrained_like(runs.build_model(cfg)).requires_grad_(False).eval(), cfg
+
+
+def architecture_rows(
+    pictured: Pictured, like: dict[str, Any], *, num_pixels: int, repeats: int
+) -> list[dict[str, Any]]:
+    """Seconds to encode and to render some pixels by renderer=culled, of each build."""
+    rows = []
+    for name, overrides in BUILDS.items():
+        network, _ = network_of(overrides)
+        one = subject(pictured, network, kind=name, num_pixels=num_pixels)
+        renderer = CulledRenderer(**like)
+        methods: dict[str, Callable[[], Any]] = {
+            "encode": partial(network.encode, one.views),
+            "render": partial(renderer.render, one.scene, one.rays),
+        }
+        with torch.no_grad():
+            timings = in_turns(methods, repeats=repeats, device=one.truth.device)
+        rows.append(
+            {
+                "build": name,
+                "parameters": parameters_of(network),
+                "encode_seconds": timings["encode"].median,
+                "render_seconds": timings["render"].median,
+            }
+        )
+    return rows
+
+
+def large_network(pictured: Pictured, like: dict[str, Any], *, repeats: int) -> dict[str, Any]:
+    """Speed-ups of rendering over the baseline at the width and depth of pixelNeRF, seeded weights."""
+    network, _ = network_of(PIXELNERF)
+    one = subject(pictured, network, kind="pixelNeRF's size", num_pixels=NUM_RAYS)
+    tolerance = 0.05
+    methods: dict[str, Callable[[], Any]] = {
+        BASELINE: partial(PixelNeRFLike(network).render, one.maps, one.rays),
+        CULLED: partial(CulledRenderer(**like).render, one.scene, one.rays),
+        ADAPTIVE: partial(AdaptiveRenderer(**like, tolerance=tolerance).render, one.scene, one.rays),
+    }
+    with torch.no_grad():
+        timings = in_turns(methods, repeats=repeats, device=one.truth.device)
+    base = timings[BASELINE].median
+    return {
+        "parameters": parameters_of(network),
+        "rays": NUM_RAYS,
+        "seconds": {name: timing.median for name, timing in timings.items()},
+        "speedup": {name: base / timing.median for name, timing in timings.items()},
+    }
+
+
+def step_at_scale(pictured: Pictured, scale: str, *, num_rays: int, repeats: int) -> dict[str, Any]:
+    """A training step at a scale, seeded weights: packed, dense, and as the baseline."""
+    network, cfg = network_of((f"scale={scale}",))
+    renderer = runs.build_renderer(cfg)
+    like: dict[str, Any] = {
+        "quadrature": renderer.quadrature,
+        "num_coarse": int(cfg.scale.train_num_coarse),
+        "num_fine": renderer.num_fine,
+        "hull_steps": renderer.hull_steps,
+        "memory_mib": renderer.memory_mib,
+    }
+    one = subject(pictured, network, kind=scale, num_pixels=num_rays)
+    renderers = {CULLED: CulledRenderer(**like), "dense": DenseRenderer(**like)}
+    timings = step_timings(one, batch_of(one, num_rays), renderers, repeats=repeats, baseline=BASELINE)
+    fast = timings[CULLED].median
+    return {
+        "scale": scale,
+        "rays": num_rays,
+        "seconds": {name: timing.median for name, timing in timings.items()},
+        "speedup_of_culled": {name: timing.median / fast for name, timing in timings.items()},
+    }

@@ -1,0 +1,139 @@
+"""How seconds and memory grow with the size of the work: exponents fitted to doublings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+
+from charnerf.bench.grids import CUBE_SIDE, grid_sampler
+from charnerf.bench.headline import ADAPTIVE, CULLED, Workbench
+from charnerf.bench.memory import resized
+from charnerf.bench.subjects import Pictured, Subject
+from charnerf.evaluation.timing import Stopwatch
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import SourceViews
+from charnerf.volume.renderers.culled import CulledRenderer
+
+IMAGE_SIDES, GRID_SIDES, VIEWS, CHARACTERS, SAMPLES = (
+    (64, 128, 256, 512),
+    (64, 128, 256),
+    (1, 2, 4, 8),
+    (1, 2, 4),
+    (8, 16, 32, 64),
+)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Seconds and rise of memory by size, with exponents p of size^p.
+
+    Attributes:
+        over: What grows.
+        sizes: Its sizes.
+        seconds: Of the work at each.
+        memory_mib: Rise of resident memory at each (heaps keep what they once had: a lower bound).
+        seconds_exponent: Least squares in logarithms, the smallest size left out: fixed costs rule there.
+    """
+
+    over: str
+    sizes: tuple[int, ...]
+    seconds: tuple[float, ...]
+    memory_mib: tuple[float, ...]
+    seconds_exponent: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return dict(vars(self))
+
+
+def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
+    """P of value = c * size^p by least squares in logarithms.
+
+    >>> round(exponent([1, 2, 4], [3, 12, 48]), 6)
+    2.0
+    """
+    return float(np.polyfit(np.log(np.asarray(sizes)), np.log(np.maximum(values, 1e-9)), 1)[0])
+
+
+def grow(over: str, work: Mapping[int, Callable[[], Any]], device: torch.device) -> Growth:
+    """Run work of several sizes, twice each; the faster run counts.
+
+    Args:
+        over: What grows.
+        work: By size, ascending.
+        device: Where it runs.
+    """
+    seconds, memory = [], []
+    with Stopwatch(device) as watch, torch.no_grad():
+        for size, call in work.items():
+            taken = []
+            for turn in range(2):
+                name = f"{size}:{turn}"
+                with watch.stage(f"before {name}"):
+                    pass
+                with watch.stage(name):
+                    call()
+                taken.append(watch.total_seconds(name))
+                peaks = watch.peaks_mib()
+                rise = peaks.get(name, math.nan) - peaks.get(f"before {name}", math.nan)
+                if turn == 0:
+                    memory.append(rise)
+            seconds.append(min(taken))
+    sizes = tuple(work)
+    fitted = exponent(sizes[1:], seconds[1:])
+    return Growth(over, sizes, tuple(seconds), tuple(memory), fitted)
+
+
+def growths(
+    bench: Workbench, subject: Subject, pictured: Sequence[Pictured], views: SourceViews
+) -> list[Growth]:
+    """All the growths of the report.
+
+    Args:
+        bench: What is measured.
+        subject: One character.
+        pictured: Several, of one drawing size.
+        views: The subject's character from eight sides, B = 1.
+    """
+    device = subject.truth.device
+    adaptive = bench.renderers[ADAPTIVE]
+
+    def picture(size: int) -> Callable[[], Any]:
+        return lambda: adaptive.render_camera(subject.scene, resized(subject.camera, size))
+
+    def grid(size: int) -> Callable[[], Any]:
+        return lambda: grid_sampler(subject, size, 8).evaluate_surface(50.0)
+
+    def seen_by(count: int) -> Callable[[], Any]:
+        scene = _scene(bench.network, views[:, :count])
+        return lambda: bench.renderers[CULLED].render(scene, subject.rays)
+
+    def encode(count: int) -> Callable[[], Any]:
+        batch = _batch([pictured[i % len(pictured)].views for i in range(count)])
+        return lambda: bench.network.encode(batch.to(device))
+
+    def sampled(count: int) -> Callable[[], Any]:
+        renderer = CulledRenderer(**{**bench.like, "num_coarse": count})
+        return lambda: renderer.render(subject.scene, subject.rays)
+
+    return [
+        grow("image side, pixels (adaptive)", {n: picture(n) for n in IMAGE_SIDES}, device),
+        grow(f"grid cells along {CUBE_SIDE} m (sparse)", {n: grid(n) for n in GRID_SIDES}, device),
+        grow("source views (culled)", {n: seen_by(n) for n in VIEWS}, device),
+        grow("characters (encode)", {n: encode(n) for n in CHARACTERS}, device),
+        grow("samples a ray (culled)", {n: sampled(n) for n in SAMPLES}, device),
+    ]
+
+
+def _scene(network: CharNeRF, views: SourceViews) -> Any:
+    with torch.no_grad():
+        return network.scene(network.encode(views), 0)
+
+
+def _batch(views: Sequence[SourceViews]) -> SourceViews:
+    return SourceViews.joined(list(views))

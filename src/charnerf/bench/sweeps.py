@@ -1,0 +1,168 @@
+"""Sweeps of one setting at a time: each row is a point of a work-precision diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from statistics import median
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from charnerf.bench.baseline import PixelNeRFLike
+from charnerf.bench.headline import Workbench
+from charnerf.bench.measure import in_turns
+from charnerf.bench.subjects import Subject, pixels_psnr
+from charnerf.bench.tricks import precise_scene, variants
+from charnerf.types import Rendering
+from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.culled import CulledRenderer
+from charnerf.volume.renderers.dense import DenseRenderer
+
+Method = Callable[[Subject], Callable[[], Any]]
+SAMPLES = (4, 8, 16, 32, 64, 128)
+DENSE_SAMPLES = (4, 8, 16, 32)
+BASELINE_SAMPLES = ((16, 8), (32, 16), (64, 32), (128, 64))
+TOLERANCES = (0.2, 0.1, 0.05, 0.02, 0.01)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting of one method, over subjects.
+
+    Attributes:
+        curve: Method: a curve of the diagram.
+        setting: What was set.
+        seconds: Median over subjects of the median seconds of a call for all the subject's rays.
+        spread: Greatest over least of the seconds of a subject's turns, the largest of all subjects.
+        rms_error: Against the converged references, over all subjects' colours.
+        max_error: The largest.
+        psnr: Against the truth, mean over subjects, dB.
+    """
+
+    curve: str
+    setting: str
+    seconds: float
+    spread: float
+    rms_error: float
+    max_error: float
+    psnr: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return dict(vars(self))
+
+
+def sweep(
+    methods: Mapping[tuple[str, str], Method],
+    subjects: Sequence[Subject],
+    references: Sequence[Tensor],
+    *,
+    repeats: int,
+) -> list[Row]:
+    """Measure methods, by (curve, setting), on subjects."""
+    seconds: dict[tuple[str, str], list[float]] = {key: [] for key in methods}
+    spreads: dict[tuple[str, str], list[float]] = {key: [] for key in methods}
+    errors: dict[tuple[str, str], list[Tensor]] = {key: [] for key in methods}
+    psnrs: dict[tuple[str, str], list[float]] = {key: [] for key in methods}
+    for subject, truth in zip(subjects, references, strict=True):
+        with torch.no_grad():
+            calls = {"\n".join(key): method(subject) for key, method in methods.items()}
+            timings = in_turns(calls, repeats=repeats, device=subject.truth.device)
+        for name, timing in timings.items():
+            curve, setting = name.split("\n")
+            answer = timing.answer.finest.rgb if isinstance(timing.answer, Rendering) else timing.answer.rgb
+            seconds[curve, setting].append(timing.median)
+            spreads[curve, setting].append(timing.high / timing.low)
+            errors[curve, setting].append((answer.double() - truth).abs())
+            psnrs[curve, setting].append(pixels_psnr(answer, subject.truth))
+    return [
+        Row(
+            curve=key[0],
+            setting=key[1],
+            seconds=median(seconds[key]),
+            spread=max(spreads[key]),
+            rms_error=float(torch.cat(errors[key]).square().mean().sqrt()),
+            max_error=float(torch.cat(errors[key]).amax()),
+            psnr=sum(psnrs[key]) / len(psnrs[key]),
+        )
+        for key in methods
+    ]
+
+
+def sample_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
+    """Samples a ray: the baseline, dense, culled; and adaptive by tolerance."""
+    like = bench.like
+    methods: dict[tuple[str, str], Method] = {}
+    for coarse, fine in BASELINE_SAMPLES:
+        methods["pixelNeRF-like", f"{coarse} + {fine}"] = partial(_baseline, coarse, fine)
+    for count in DENSE_SAMPLES:
+        methods["dense", str(count)] = partial(_render, DenseRenderer(**{**like, "num_coarse": count}))
+    for count in SAMPLES:
+        methods["culled", str(count)] = partial(_render, CulledRenderer(**{**like, "num_coarse": count}))
+    for tolerance in TOLERANCES:
+        adaptive = AdaptiveRenderer(**like, tolerance=tolerance)
+        methods["adaptive", f"tolerance {tolerance:g}"] = partial(_render, adaptive)
+    return methods
+
+
+def trick_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
+    """Each trick off while the others stay on, by renderer=culled with its own number of samples."""
+    return {("one trick off", name): build for name, build in variants(bench).items()}
+
+
+def precision_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
+    """Precisions of the field, by renderer=culled."""
+    culled = bench.renderers["culled"]
+    methods: dict[tuple[str, str], Method] = {("precision", "float32"): partial(_render, culled)}
+    methods["precision", "float64"] = partial(_in_float64, culled)
+    methods["precision", "bfloat16 (autocast)"] = partial(_autocast, culled)
+    return methods
+
+
+def compiled_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
+    """The field as it is and compiled, by renderer=culled; compiling is warm-up and not counted."""
+    culled = bench.renderers["culled"]
+    return {
+        ("compile", "eager"): partial(_render, culled),
+        ("compile", "torch.compile"): partial(_compiled, culled),
+    }
+
+
+def _baseline(coarse: int, fine: int, subject: Subject) -> Callable[[], Any]:
+    method = PixelNeRFLike(subject.network, num_coarse=coarse, num_fine=fine)
+    return partial(method.render, subject.maps, subject.rays)
+
+
+def _render(renderer: Any, subject: Subject) -> Callable[[], Any]:
+    return partial(renderer.render, subject.scene, subject.rays)
+
+
+def _in_float64(renderer: Any, subject: Subject) -> Callable[[], Any]:
+    scene, rays = precise_scene(subject), subject.rays.to(torch.float64)
+    return partial(renderer.render, scene, rays)
+
+
+def _autocast(renderer: Any, subject: Subject) -> Callable[[], Any]:
+    def render() -> Rendering:
+        with torch.autocast(subject.truth.device.type, torch.bfloat16):
+            return renderer.render(subject.scene, subject.rays)
+
+    return render
+
+
+def _compiled(renderer: Any, subject: Subject) -> Callable[[], Any]:
+    field = torch.compile(subject.scene.coarse, dynamic=True)
+    scene = replace(subject.scene, coarse=field)
+    return partial(renderer.render, scene, subject.rays)
+
+
+def pareto(rows: Sequence[Row]) -> list[Row]:
+    """Rows that no other beats in both seconds and error, fastest first."""
+    front: list[Row] = []
+    for row in sorted(rows, key=lambda one: (one.seconds, one.rms_error)):
+        if not front or row.rms_error < front[-1].rms_error:
+            front.append(row)
+    return front

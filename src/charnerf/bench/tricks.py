@@ -1,0 +1,120 @@
+"""The single tricks, each switched off: what it is worth while all others stay on."""
+
+from __future__ import annotations
+
+import copy
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from charnerf.bench.baseline import PixelNeRFLike
+from charnerf.bench.headline import Workbench
+from charnerf.bench.subjects import Subject, hull_in_float64
+from charnerf.geometry.hull import hull_contains
+from charnerf.models.lookup import maps_to_rows
+from charnerf.models.view_maps import ViewMaps
+from charnerf.types import FieldOutput, Scene
+from charnerf.volume.renderers.culled import CulledRenderer
+from charnerf.volume.renderers.dense import DenseRenderer
+
+Variant = Callable[[Subject], Callable[[], Any]]
+
+
+def variants(bench: Workbench) -> dict[str, Variant]:
+    """By name what renders a subject with a trick off."""
+    culled = bench.renderers["culled"]
+    like = bench.like
+
+    def on(subject: Subject) -> Callable[[], Any]:
+        return partial(culled.render, subject.scene, subject.rays)
+
+    def unpacked(subject: Subject) -> Callable[[], Any]:
+        return partial(DenseRenderer(**like).render, subject.scene, subject.rays)
+
+    def without_hull_segments(subject: Subject) -> Callable[[], Any]:
+        """Samples over the whole box at the same spacing, packed by the hull all the same."""
+        scene = replace(subject.scene, hull=None, coarse=_masked(subject.scene))
+        side = float((subject.scene.box_max - subject.scene.box_min).amax())
+        count = max(like["num_coarse"], round(side / _spacing(subject, CulledRenderer(**like))))
+        renderer = CulledRenderer(**{**like, "num_coarse": count})
+        return partial(renderer.render, scene, subject.rays)
+
+    def by_grid_sample(subject: Subject) -> Callable[[], Any]:
+        baseline = PixelNeRFLike(subject.network)
+        ask = partial(baseline.evaluate, subject.network.coarse, subject.maps)
+        scene = replace(subject.scene, coarse=ask, fine=None, densities_first=None)
+        return partial(culled.render, scene, subject.rays)
+
+    def unhoisted(subject: Subject) -> Callable[[], Any]:
+        scene = replace(subject.scene, coarse=_unhoisted(subject), fine=None, densities_first=None)
+        return partial(culled.render, scene, subject.rays)
+
+    def huge_chunks(subject: Subject) -> Callable[[], Any]:
+        renderer = CulledRenderer(**like)
+        renderer.points_at_once = sys.maxsize
+        return partial(renderer.render, replace(subject.scene, bytes_a_point=1), subject.rays)
+
+    return {
+        "all on": on,
+        "packing off": unpacked,
+        "hull segments off": without_hull_segments,
+        "rows off (grid_sample, not hoisted)": by_grid_sample,
+        "hoisting off": unhoisted,
+        "chunks off (one batch)": huge_chunks,
+    }
+
+
+def _masked(scene: Scene) -> Callable[[Tensor, Tensor], FieldOutput]:
+    """The field with the hull applied, evaluated only inside."""
+    hull = scene.hull
+
+    def field(points: Tensor, dirs: Tensor) -> FieldOutput:
+        if hull is None:
+            return scene.coarse(points, dirs)
+        inside = hull_contains(hull, points).nonzero()[:, 0]
+        answer = scene.coarse(points[inside], dirs[inside])
+        return FieldOutput(
+            rgb=points.new_zeros(points.shape).index_copy(0, inside, answer.rgb),
+            densities=points.new_zeros(len(points)).index_copy(0, inside, answer.densities),
+        )
+
+    return field
+
+
+def _spacing(subject: Subject, culled: CulledRenderer) -> float:
+    """Mean distance of samples on the occupied part of rays that meet the hull, m."""
+    length = culled.occupied(subject.scene, subject.rays).length
+    met = length[length > 0]
+    return float(met.mean()) / culled.num_coarse if len(met) else 0.05
+
+
+def _unhoisted(subject: Subject) -> Callable[[Tensor, Tensor], FieldOutput]:
+    """The field with its linear layer applied to what is read at each point."""
+    network, field, views = subject.network, subject.network.coarse, subject.maps.views
+    maps = subject.maps.feature_maps
+    present = torch.arange(len(maps), device=maps.device)
+    seen_by = ViewMaps.of(views, subject.maps.hull, present, (maps.shape[-1], maps.shape[-2]))
+    inputs = partial(
+        network.point_inputs,
+        maps=seen_by,
+        latents=maps_to_rows(maps),
+        mirrored=views.mirrored.to(maps.dtype),
+    )
+
+    def answer(points: Tensor, dirs: Tensor) -> FieldOutput:
+        seen = inputs(points, dirs)
+        return field(replace(seen, latents=field.from_latents(seen.latents) * seen.valid[..., None]))
+
+    return answer
+
+
+def precise_scene(subject: Subject) -> Scene:
+    """The subject's scene in float64, over the same hull."""
+    network = copy.deepcopy(subject.network).double()
+    encoded = network.encode(subject.views.to(torch.float64), hull_in_float64(subject))
+    return network.scene(encoded, 0)
