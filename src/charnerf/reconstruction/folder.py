@@ -100,7 +100,7 @@ def reconstruct(
         built = hero.build_mesh(
             resolution=resolution, num_cameras=num_cameras, faces=faces, on_points=_meter(bar, resolution)
         )
-        bar.update(bar.total - bar.n)
+        bar.update((bar.total or 0) - bar.n)
     seconds = {
         "encode": encoded - start,
         f"{frames} frames of {size} pixels": rendered - encoded,
@@ -142,7 +142,7 @@ def _meter(bar: tqdm, resolution: int) -> Callable[[int], None]:
     per_point = MESH_STEPS / (MESH_POINTS * resolution**3)
 
     def step(count: int) -> None:
-        bar.update(max(0.0, min(count * per_point, bar.total - 0.5 - bar.n)))
+        bar.update(max(0.0, min(count * per_point, (bar.total or 0) - 0.5 - bar.n)))
 
     return step
 
