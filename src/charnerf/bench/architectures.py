@@ -29,8 +29,9 @@ BUILDS = {
     "combinator=view_mha": ("combinator=view_mha",),
     "experiment=charnerf": ("experiment=charnerf",),
 }
-PIXELNERF = (
-    "experiment=no_mha_depth",
+PIXELNERF = (  # its MLPs and its number of features; the encoder is ours
+    "experiment=no_mha",
+    "scale.feature_dim=256",
     "model.width=512",
     "model.num_single_view_blocks=3",
     "model.num_multi_view_blocks=2",

@@ -29,13 +29,19 @@ from charnerf.volume.compositing import expected_depth
 from charnerf.volume.quadrature.base import AbstractQuadrature
 from charnerf.volume.renderers.base import WHITE, AbstractRenderer, chunk_size
 from charnerf.volume.renderers.culled import CulledRenderer
-from charnerf.volume.renderers.refinement import Marched, light_before, march, split_bins
+from charnerf.volume.renderers.refinement import (
+    Marched,
+    heavy_weights,
+    light_before,
+    march,
+    split_bins,
+)
 from charnerf.volume.renderers.samples import Samples
 
 SPACING = 0.03  # m: longest bin at the start; no feature of a field read from drawings is much thinner
 MAX_BINS = 128  # of a ray at the start
 UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque surface
-COLOUR_SHARE = 0.05  # of the tolerance: weight from which on a sample's colour is evaluated
+UNCOLOURED_SHARE = 0.15  # of the tolerance: light whose colour need not be known
 NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
 RAYS_AT_ONCE = 4096
 POINTS_A_STAGE = 2048  # front to back; fewer would save samples and cost calls
@@ -157,9 +163,8 @@ class AdaptiveRenderer(AbstractRenderer):
         widths = s_edges.diff(dim=-1)
         densities = block.samples.densities(numbers)
         before, after = light_before(densities * widths)
-        rgb, known = block.samples.colours(
-            numbers, (numbers >= 0) & (before - after > COLOUR_SHARE * self.tolerance)
-        )
+        heavy = heavy_weights(before - after, UNCOLOURED_SHARE * self.tolerance)
+        rgb, known = block.samples.colours(numbers, (numbers >= 0) & heavy)
         marched = march(densities, rgb, known, widths, begins, WHITE)
         stopped = ((numbers < 0) & (widths > 0)).any(-1)
         left = torch.where(stopped, after[:, -1], 0.0)

@@ -35,6 +35,14 @@ def light_before(depths: Tensor) -> tuple[Tensor, Tensor]:
     return torch.exp(depths - after), torch.exp(-after)
 
 
+def heavy_weights(weights: Tensor, budget: float) -> Tensor:
+    """The fewest weights (R, K) that leave out no more than a budget of light in each ray, (R, K) bool."""
+    ascending = weights.sort(dim=-1).values
+    light = ascending.cumsum(-1) <= budget
+    first = light.sum(-1, keepdim=True).clamp_max(weights.shape[-1] - 1)
+    return (weights >= ascending.gather(-1, first)) & (weights > 0) & ~light.all(-1, keepdim=True)
+
+
 def march(
     densities: Tensor, rgb: Tensor, known: Tensor, widths: Tensor, begins: Tensor, background: float
 ) -> Marched:
