@@ -12,6 +12,7 @@ from torch import Tensor
 
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all
+from charnerf.geometry.occupied import POOL, RAYS_AT_ONCE, candidates, coarse_occupancy, occupied_at
 from charnerf.geometry.rays import box_interval
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews
 
@@ -19,6 +20,7 @@ log = logging.getLogger(__name__)
 
 MASK_ALPHA = 0.05  # a pixel that is covered this much belongs to the silhouette
 WIDEST_DILATION = 32.0  # pixels; drawings that disagree by more are not of one character
+FIRST_HIT_STEPS = 192
 MAP_SIZE = 128  # pixels a side, at most, of the front-depth and edge-distance maps
 ROUNDING = 2.0**0.5  # pixels by which distances read at two pixels' centres may be off, at most
 
@@ -73,13 +75,18 @@ def hull_contains(hull: Hull, points: Tensor) -> Tensor:
     return inside & hull.occupancy.reshape(-1)[flat]
 
 
-def occupied_edges(hull: Hull, rays: RayBundle, num_steps: int) -> tuple[Tensor, Tensor]:
+def occupied_edges(
+    hull: Hull, rays: RayBundle, num_steps: int, coarse: Tensor | None = None
+) -> tuple[Tensor, Tensor]:
     """Divide rays inside the hull's box into equal steps and say which are occupied.
+
+    Rays that pass by every pooled cell of the hull are not looked up step by step.
 
     Args:
         hull: One character's hull.
         rays: Rays (R,).
         num_steps: Steps a ray, N.
+        coarse: Its `coarse_occupancy`, computed here if not given.
 
     Returns:
         t_edges (R, N + 1), m, and occupied (R, N), bool, by the steps' midpoints.
@@ -87,15 +94,16 @@ def occupied_edges(hull: Hull, rays: RayBundle, num_steps: int) -> tuple[Tensor,
     near, far = box_interval(rays, hull.box_min, hull.box_max)
     share = torch.linspace(0.0, 1.0, num_steps + 1, dtype=near.dtype, device=near.device)
     t_edges = near[:, None] + (far - near)[:, None] * share
-    cells = hull.occupancy.shape[0]
-    scale = cells / (hull.box_max - hull.box_min)
-    start, slope = (rays.origins - hull.box_min) * scale, rays.directions * scale
-    middle = 0.5 * (t_edges[:, 1:] + t_edges[:, :-1])
-    flat = torch.zeros_like(middle, dtype=torch.long)
-    for axis in range(3):
-        index = (start[:, axis, None] + slope[:, axis, None] * middle).clamp_(0, cells - 1).long()
-        flat = flat * cells + index
-    return t_edges, hull.occupancy.reshape(-1)[flat] & (far > near)[:, None]
+    if hull.occupancy.shape[0] % POOL:
+        index = torch.arange(len(near), device=near.device)
+    else:
+        index = candidates(hull, coarse_occupancy(hull.occupancy) if coarse is None else coarse, rays).index
+    occupied = torch.zeros(len(near), num_steps, dtype=torch.bool, device=near.device)
+    for some in index.split(RAYS_AT_ONCE):
+        edges = t_edges[some]
+        found = occupied_at(hull.occupancy, hull, rays[some], 0.5 * (edges[:, 1:] + edges[:, :-1]))
+        occupied[some] = found & (far > near)[some, None]
+    return t_edges, occupied
 
 
 def _carve(
@@ -200,7 +208,7 @@ def _tight_box(
 
 def _first_hits(hull: Hull, rays: RayBundle) -> tuple[Tensor, Tensor]:
     """Distance to the first occupied step, (R,), m, and whether there is one."""
-    t_edges, occupied = occupied_edges(hull, rays, 192)
+    t_edges, occupied = occupied_edges(hull, rays, FIRST_HIT_STEPS)
     first = occupied.to(torch.uint8).argmax(-1, keepdim=True)
     return torch.gather(t_edges, -1, first)[:, 0], occupied.any(-1)
 

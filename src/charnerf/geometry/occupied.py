@@ -88,7 +88,7 @@ def occupied_at(occupancy: Tensor, hull: Hull, rays: RayBundle, t_vals: Tensor) 
     start, slope = (rays.origins - hull.box_min) * scale, rays.directions * scale
     flat: Tensor | None = None
     for axis in range(3):
-        index = torch.addcmul(start[:, axis, None], slope[:, axis, None], t_vals).clamp_(0, cells - 1).int()
+        index = (slope[:, axis, None] * t_vals).add_(start[:, axis, None]).clamp_(0, cells - 1).int()
         flat = index if flat is None else flat.mul_(cells).add_(index)
     assert flat is not None
     return occupancy.reshape(-1)[flat]

@@ -162,7 +162,7 @@ class AbstractRenderer(ABC):
         if scene.hull is None:
             near, far = box_interval(rays, scene.box_min, scene.box_max)
             return OccupiedRays(rays, torch.stack((near, far), dim=-1), (far > near)[:, None], far - near)
-        t_edges, occupied = occupied_edges(scene.hull, rays, self.hull_steps)
+        t_edges, occupied = occupied_edges(scene.hull, rays, self.hull_steps, scene.coarse_hull)
         return OccupiedRays(rays, t_edges, occupied, (torch.diff(t_edges, dim=-1) * occupied).sum(-1))
 
     def _in_chunks(self, field: FieldFunction, points: Tensor, dirs: Tensor, size: int) -> FieldOutput:
