@@ -70,10 +70,13 @@ def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
     for part in inside.split(CHUNK):
         here = points[part]
         if scene.density_sees_directions:
-            answers = [scene.field(here, safe_normalize(here - position)).densities for position in positions]
+            answers = [
+                scene.answer_densities(here, safe_normalize(here - position)).densities
+                for position in positions
+            ]
             densities[part] = torch.stack(answers).mean(0)
         else:
-            densities[part] = scene.field(here, torch.zeros_like(here)).densities
+            densities[part] = scene.answer_densities(here, torch.zeros_like(here)).densities
     if not bool(densities.isfinite().all()):
         bad = int((~densities.isfinite()).sum())
         raise NumericalError(

@@ -48,9 +48,10 @@ def weighted_sum(weights: Tensor, view_features: Tensor) -> Tensor:
     """Sum over the views of weights (P, V) times features (P, V, D): (P, D).
 
     View by view: with three or four views that needs fewer passes over memory than a product and a sum, and far less than a
-    batched matrix product.
+    batched matrix product. Unbound, because the gradient of a slice is a whole tensor of zeros.
     """
-    total = view_features[:, 0] * weights[:, :1]
-    for view in range(1, view_features.shape[1]):
-        total = torch.addcmul(total, view_features[:, view], weights[:, view : view + 1])
+    first, *others = zip(view_features.unbind(1), weights.unbind(1), strict=True)
+    total = first[0] * first[1][:, None]
+    for features, weight in others:
+        total = torch.addcmul(total, features, weight[:, None])
     return total
