@@ -143,7 +143,7 @@ def evaluate(
         ),
     ] = None,
     renderer: Annotated[
-        Literal["culled", "dense"] | None,
+        Literal["culled", "dense", "adaptive"] | None,
         typer.Option(help="Another renderer than the model was trained with."),
     ] = None,
     mesh: Annotated[bool, typer.Option(help="Make every mesh, for Chamfer and F-score.")] = True,

@@ -36,6 +36,9 @@ RENDERERS = {
 }
 
 
+TOLERANCE = 0.05  # of conf/renderer/adaptive.yaml
+
+
 def say(text: str) -> None:
     """Tell the user, beside what a command prints for programs."""
     sys.stderr.write(f"{text}\n")
@@ -46,7 +49,10 @@ def load_model(path: Path | None, *, device: str, trust: Sequence[str], renderer
     model = runs.load(path, trusted_targets=trust).to(pick_device(device))
     if renderer is None:
         return model
-    changed = OmegaConf.merge(model.config, {"renderer": {"_target_": RENDERERS[renderer]}})
+    shared = {name: value for name, value in model.config.renderer.items() if name != "tolerance"}
+    own = {"tolerance": TOLERANCE} if renderer == "adaptive" else {}
+    changed = OmegaConf.create(OmegaConf.to_container(model.config, resolve=True))
+    changed.renderer = {**shared, "_target_": RENDERERS[renderer], **own}
     return replace(model, renderer=runs.build_renderer(changed))  # type: ignore[arg-type]
 
 
