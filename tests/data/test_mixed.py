@@ -14,8 +14,8 @@ from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface, load_surface_mesh
 from charnerf.data.validation import ValidationDataset, spread_frames
 from charnerf.errors import DataError
-from charnerf.geometry.cameras import project
-from charnerf.geometry.hull import build_hull
+from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
+from charnerf.geometry.hull import build_hull, occupied_edges
 from charnerf.models.views.turnaround import Turnaround
 from charnerf.types import SourceViews, TrainBatch
 
@@ -103,13 +103,28 @@ def test_rays_carry_the_colours_that_the_figure_has(store):
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_the_share_of_foreground_is_kept(store, share):
-    """At least so many rays show the character; the rest falls anywhere."""
     batch = dataset_of(store, foreground_share=share)[request(rays=4000)]
+    assert (batch.alpha > 0).float().mean().item() == pytest.approx(share)
+
+
+def test_background_is_drawn_only_where_the_hull_may_be(store):
+    """Every ray that can teach anything may be drawn, no other is."""
+    batch = dataset_of(store, foreground_share=0.0)[request(rays=4000)]
     one = store.open(batch.names[0])
-    covered = len(one.foreground) / one.images[..., 0].numel()
-    expected = share + (1.0 - share) * covered
-    assert (batch.alpha > 0).float().mean().item() == pytest.approx(expected, abs=0.03)
-    assert share < 1.0 or (batch.alpha > 0).all()
+    shown = one.images[..., 3].reshape(-1) > 0
+    assert not shown[one.background.long()].any()
+    assert len(one.background) < 0.6 * (~shown).sum()
+    everywhere = torch.cat([pixel_centres(helpers.SIZE, helpers.SIZE).reshape(-1, 2)] * len(one.images))
+    cameras = one.character.cameras[torch.arange(len(one.images)).repeat_interleave(helpers.SIZE**2)]
+    met = occupied_edges(one.hull[0], pixel_rays(cameras, everywhere), 256)[1].any(-1)
+    drawable = torch.zeros_like(met).index_fill_(0, one.background.long(), True)
+    assert not (met & ~shown & ~drawable).any()
+
+
+def test_without_a_hull_any_background_is_drawn(figure_dataset):
+    open_world = store_of(figure_dataset, hull=False)
+    one = open_world.open(NAMES[0])
+    assert len(one.background) + len(one.foreground) == one.images[..., 0].numel()
 
 
 def test_depth_is_along_the_ray(store):

@@ -35,7 +35,8 @@ class MixedDataset(Dataset[TrainBatch]):
         store: The characters.
         surface_of: A character's surface, None where no loss reads it or there is no mesh.
         characters: B, characters a step.
-        foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white.
+        foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white;
+            the rest is drawn from pixels beside it whose rays may meet the hull.
         space_points: Labelled points a step, 0 where no loss reads them.
         reads_depth: Whether depth pictures are read.
         used_views: The model's rule from drawings to views; a hull has maps of all of those.
@@ -109,16 +110,8 @@ class MixedDataset(Dataset[TrainBatch]):
         self, one: OpenCharacter, num_rays: int, generator: torch.Generator
     ) -> tuple[RayBundle, Tensor, Tensor, Tensor]:
         """Rays with colour, alpha and depth of one character."""
-        num_images, height, width = one.images.shape[:3]
-        num_foreground = round(self.foreground_share * num_rays) if len(one.foreground) else 0
-        anywhere = torch.randint(
-            num_images * height * width, (num_rays - num_foreground,), generator=generator
-        )
-        if num_foreground:
-            picked = torch.randint(len(one.foreground), (num_foreground,), generator=generator)
-            flat = torch.cat((one.foreground[picked].long(), anywhere))
-        else:
-            flat = anywhere
+        height, width = one.images.shape[1:3]
+        flat = self._pixels(one, num_rays, generator)
         image, rest = flat // (height * width), flat % (height * width)
         pixels = torch.stack((rest % width + 0.5, rest // width + 0.5), dim=-1)
         rgba = one.images.reshape(-1, 4)[flat].float() / 255.0
@@ -127,6 +120,18 @@ class MixedDataset(Dataset[TrainBatch]):
         rays = pixel_rays(camera, pixels)
         depth = self._depths(one, image, rest, camera, rays) if self.reads_depth else alpha
         return rays, rgb * alpha[:, None] + (1.0 - alpha[:, None]), alpha, depth
+
+    def _pixels(self, one: OpenCharacter, num_rays: int, generator: torch.Generator) -> Tensor:
+        """Flat indices (R,) of pixels: a share that shows the character, the rest background before its hull."""
+        share = self.foreground_share
+        if len(one.foreground) == 0 or len(one.background) == 0:
+            share = float(len(one.background) == 0)
+        counts = (round(share * num_rays), num_rays - round(share * num_rays))
+        picked = []
+        for pixels, count in zip((one.foreground, one.background), counts, strict=True):
+            if count:
+                picked.append(pixels[torch.randint(len(pixels), (count,), generator=generator)])
+        return torch.cat(picked).long()
 
     def _depths(
         self, one: OpenCharacter, image: Tensor, rest: Tensor, camera: Cameras, rays: RayBundle

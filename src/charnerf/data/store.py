@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
+from charnerf.geometry.silhouettes import hull_silhouettes
 from charnerf.types import Hull, SourceViews
 
 
@@ -22,18 +23,20 @@ class OpenCharacter:
         images: uint8 (N, H, W, 4).
         hull: Hull of its drawings (B = 1), None for a model without.
         foreground: Flat indices into (N, H, W) of pixels that show the character, int32.
+        background: Those of the other pixels whose rays may meet the hull, int32: of the rest there is nothing to learn.
     """
 
     character: Character
     images: Tensor
     hull: Hull | None
     foreground: Tensor
+    background: Tensor
 
     @property
     def size_bytes(self) -> int:
         """Memory of the tensors."""
         hull = 0 if self.hull is None else self.hull.occupancy.numel() + 8 * self.hull.front_depths.numel()
-        return self.images.numel() + 4 * self.foreground.numel() + hull
+        return self.images.numel() + 4 * (self.foreground.numel() + self.background.numel()) + hull
 
 
 @final
@@ -74,8 +77,12 @@ class CharacterStore:
             return found
         character = load_character(self.root, name)
         images = character.images(range(len(character.image_files)))
-        foreground = images[..., 3].reshape(-1).nonzero()[:, 0].to(torch.int32)
-        opened = OpenCharacter(character, images, self.carve(character.sources), foreground)
+        hull = self.carve(character.sources)
+        shown = images[..., 3] > 0
+        foreground = shown.reshape(-1).nonzero()[:, 0].to(torch.int32)
+        near = ~shown if hull is None else hull_silhouettes(hull[0], character.cameras) & ~shown
+        background = near.reshape(-1).nonzero()[:, 0].to(torch.int32)
+        opened = OpenCharacter(character, images, hull, foreground, background)
         self._open[name] = opened
         self._used_bytes += opened.size_bytes
         while self._used_bytes > self.memory_bytes and len(self._open) > 1:
