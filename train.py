@@ -31,7 +31,7 @@ def train(cfg: DictConfig) -> None:
 
 def train_and_report() -> None:
     """Train all jobs, then report over a sweep, also if some of its jobs failed."""
-    from charnerf.evaluation.folder_report import write_folder_report
+    from charnerf.reporting.folder_report import write_folder_report
 
     try:
         train()

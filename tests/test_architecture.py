@@ -23,6 +23,7 @@ LAYERS = (
         "meshing",
         "model_api",
         "reconstruction",
+        "reporting",
         "runs",
         "stability",
         "training",
@@ -41,7 +42,9 @@ WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may impor
     ("runs", "model_api"),
     ("training", "evaluation"),
     ("training", "meshing"),
+    ("training", "reporting"),
     ("training", "runs"),
+    ("reporting", "evaluation"),
 }
 ONLY_IN = {  # foreign package: where it may be imported
     "hydra": ("config", "runs"),

@@ -20,12 +20,12 @@ from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
-from charnerf.evaluation.folder_report import write_folder_report
-from charnerf.evaluation.report import write_run_report
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.model_api import Model
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
+from charnerf.reporting.folder_report import write_folder_report
+from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
 
 LIGHTS = {"unlit": Unlit, "headlight": Headlight}

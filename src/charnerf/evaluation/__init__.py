@@ -1,1 +1,1 @@
-"""Error against the truth and against what a user has without learning; seconds, memory and reports."""
+"""Error against the truth and against what a user has without learning; seconds and memory."""

@@ -13,11 +13,11 @@ from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
-from charnerf.evaluation.report import write_run_report
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.extract import vertex_colours
 from charnerf.models.charnerf import CharNeRF
+from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 

@@ -2,12 +2,13 @@ import json
 import re
 
 import pytest
-from figures import HullModel, HullRenderer
 
 from charnerf.errors import DataError
 from charnerf.evaluation.evaluate import evaluate, write_metrics
-from charnerf.evaluation.plots import read_curve
-from charnerf.evaluation.report import write_folder_report, write_run_report
+from charnerf.reporting.folder_report import write_folder_report
+from charnerf.reporting.plots import read_curve
+from charnerf.reporting.run_report import write_run_report
+from figures import HullModel, HullRenderer
 
 CURVE = """step,phase,seconds,rays,val_psnr,val_psnr_foreground,val_ssim,loss/rgb
 0,0,0.0,0,12.5,5.0,0.7,nan

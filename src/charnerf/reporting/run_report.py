@@ -1,13 +1,11 @@
-"""report.md and report.html of one run; `write_folder_report` makes those of all runs below a folder."""
+"""report.md and report.html of one run."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from charnerf.evaluation.blocks import Block, Bullets, Code, Heading, Picture, Table, Text
-from charnerf.evaluation.folder_report import write_folder_report
-from charnerf.evaluation.plots import plot_angles, plot_training, read_curve
-from charnerf.evaluation.report_parts import (
+from charnerf.reporting.blocks import Block, Bullets, Code, Heading, Picture, Table, Text
+from charnerf.reporting.parts import (
     BASELINE_NAMES,
     COLUMNS,
     MAX_SHEETS,
@@ -20,8 +18,7 @@ from charnerf.evaluation.report_parts import (
     verdict,
     write_report,
 )
-
-__all__ = ["write_folder_report", "write_run_report"]
+from charnerf.reporting.plots import plot_angles, plot_training, read_curve
 
 
 def _headline(metrics: Mapping[str, Any]) -> Table:

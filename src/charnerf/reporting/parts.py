@@ -7,8 +7,8 @@ from typing import Any
 
 from charnerf.data.layout import write_text_atomically
 from charnerf.errors import DataError
-from charnerf.evaluation.blocks import Block, Picture, Table, to_html, to_markdown
 from charnerf.evaluation.scores import METRIC_KEYS
+from charnerf.reporting.blocks import Block, Picture, Table, to_html, to_markdown
 
 COLUMNS = {
     "psnr": ("PSNR ↑ dB", "{:.2f}"),

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from charnerf.errors import DataError
-from charnerf.evaluation.blocks import Block, Heading, Picture, Table, Text
-from charnerf.evaluation.plots import Curve, plot_curves, read_curve
-from charnerf.evaluation.report_parts import (
+from charnerf.reporting.blocks import Block, Heading, Picture, Table, Text
+from charnerf.reporting.parts import (
     BASELINE_NAMES,
     COLUMNS,
     MAX_SHEETS,
@@ -21,6 +20,7 @@ from charnerf.evaluation.report_parts import (
     verdict,
     write_report,
 )
+from charnerf.reporting.plots import Curve, plot_curves, read_curve
 
 
 def _overrides(run: Path) -> str:
