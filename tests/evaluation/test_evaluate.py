@@ -1,3 +1,4 @@
+import csv
 import dataclasses
 import json
 import math
@@ -6,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
 from PIL import Image
 
 from charnerf.data.characters import load_character
@@ -16,6 +16,7 @@ from charnerf.evaluation.angles import azimuth_bin, view_angles
 from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
 from charnerf.evaluation.scores import METRIC_KEYS, on_white
 from charnerf.types import LeftOut, RenderOutput
+from figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
 
 
 def make_mesh(scene, views):
@@ -70,6 +71,21 @@ def test_means_are_over_the_characters(outcome):
     for key in ("psnr", "psnr_foreground", "ssim", "flip", "silhouette_iou", "chamfer_mm", "f_score"):
         both = [found["per_character"][name][key] for name in ("ball", "doll")]
         assert found[key] == pytest.approx(sum(both) / 2.0)
+
+
+def test_every_view_is_a_row_and_the_rows_mean_is_the_metric(outcome, figure_dataset):
+    found, output = outcome
+    with (output / "views.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 3 * 8
+    assert found["data_root"] == str(figure_dataset.resolve())
+    doll = [row for row in rows if (row["method"], row["character"]) == ("ours", "doll")]
+    mean = sum(float(row["psnr"]) for row in doll) / len(doll)
+    assert mean == pytest.approx(found["per_character"]["doll"]["psnr"])
+    assert {row["view"] for row in doll} == {
+        path.stem for path in (output / "images" / "doll").glob("0*.png")
+    }
+    assert all(row["lpips"] == "" for row in rows)
 
 
 def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):

@@ -14,7 +14,13 @@ from charnerf.errors import CharNeRFError, DataError
 from charnerf.evaluation import surface_error
 from charnerf.evaluation.angles import view_angles
 from charnerf.evaluation.baselines import VisualHullBaseline, white_prediction
-from charnerf.evaluation.metrics_file import Collected, collected_metrics, write_metrics
+from charnerf.evaluation.metrics_file import (
+    VIEWS_FILE,
+    Collected,
+    collected_metrics,
+    write_metrics,
+    write_views,
+)
 from charnerf.evaluation.pictures import save_prediction, save_sheet
 from charnerf.evaluation.scores import CharacterScores, score_view, to_cpu
 from charnerf.geometry.cameras import fibonacci_hemisphere
@@ -134,9 +140,8 @@ def evaluate(
         root: Folder of the data set.
         split: Which of its splits.
         views: Fixed views a character, evenly chosen among its frames, or "all".
-        output: Folder for the predictions, `images/NAME/000.png` (RGBA, named like the data set's), and one
-        contact sheet a
-            character, `images/NAME/sheet.png`; None keeps none.
+        output: Folder for the predictions, `images/NAME/000.png` (RGBA, named like the data set's), one contact
+            sheet a character, `images/NAME/sheet.png`, and every view's metrics, `views.csv`; None keeps none.
         mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them null.
         device: Where the model is.
         baselines: Whether to measure `white` and `visual_hull` too.
@@ -162,7 +167,10 @@ def evaluate(
             indices = fixed_views(character, views)
             bar.total = bar.n + len(indices) * (len(names) - place)  # the others are taken to have as many
             _evaluate_character(state, model, renderer, character, indices, output=output, mesh=mesh, bar=bar)
-    return collected_metrics(state, names, split=split, train_seconds=train_seconds)
+    if output is not None:
+        write_views(output / VIEWS_FILE, state)
+    found = collected_metrics(state, names, split=split, train_seconds=train_seconds)
+    return {**found, "data_root": str(Path(root).resolve())}
 
 
 def _evaluate_character(
@@ -245,7 +253,8 @@ def _score(
     """Measure every picture of one character."""
     angles = view_angles(character.cameras[indices], character.sources)
     for method, pictures in drawn.items():
-        scores = state.scores[method][character.name] = CharacterScores()
+        frames = [character.image_files[index].stem for index in indices]
+        scores = state.scores[method][character.name] = CharacterScores(frames=frames)
         for place, picture in enumerate(pictures):
             record = {
                 "azimuth_deg": float(angles.azimuth_deg[place]),

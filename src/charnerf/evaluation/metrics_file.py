@@ -1,5 +1,7 @@
-"""The content of metrics.json from what an evaluation collected, and the file itself."""
+"""The content of metrics.json and views.csv from what an evaluation collected, and the files themselves."""
 
+import csv
+import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,9 +12,11 @@ import torch
 from charnerf.data.layout import write_text_atomically
 from charnerf.evaluation.angles import by_azimuth, by_elevation, by_source_angle
 from charnerf.evaluation.environment import environment
-from charnerf.evaluation.scores import VIEW_KEYS, CharacterScores, summarize
+from charnerf.evaluation.scores import ANGLE_KEYS, VIEW_KEYS, CharacterScores, summarize
 from charnerf.evaluation.timing import Stopwatch, process_peak_mib
 from charnerf.types import LeftOut
+
+VIEWS_FILE = "views.csv"
 
 
 @final
@@ -111,3 +115,16 @@ def write_metrics(path: str | Path, metrics: dict[str, Any]) -> None:
         ValueError: If a number is NaN or infinite, which JSON can not say.
     """
     write_text_atomically(Path(path), json.dumps(metrics, indent=2, allow_nan=False) + "\n")
+
+
+def write_views(path: Path, state: Collected) -> None:
+    """Write views.csv: a row for every method, character and view, empty cells where a metric could not be had."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("method", "character", "view", *ANGLE_KEYS, *VIEW_KEYS))
+    for method, by_name in state.scores.items():
+        for name, scores in by_name.items():
+            for frame, record in zip(scores.frames, scores.views, strict=True):
+                table.writerow((method, name, frame, *(record[key] for key in (*ANGLE_KEYS, *VIEW_KEYS))))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text_atomically(path, text.getvalue())

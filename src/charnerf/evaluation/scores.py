@@ -13,6 +13,7 @@ from charnerf.evaluation.angles import Record, mean_of, mean_over_characters
 from charnerf.types import RenderOutput
 
 VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou")
+ANGLE_KEYS = ("azimuth_deg", "elevation_deg", "source_angle_deg")
 SURFACE_KEYS = ("chamfer_mm", "f_score")
 METRIC_KEYS = VIEW_KEYS + SURFACE_KEYS
 
@@ -23,11 +24,13 @@ class CharacterScores:
 
     Attributes:
         views: A record a view: VIEW_KEYS, azimuth_deg, elevation_deg, source_angle_deg.
+        frames: Name of each view's picture in the data set.
         surface: SURFACE_KEYS.
         reasons: Why a key is missing.
     """
 
     views: list[Record] = field(default_factory=list)
+    frames: list[str] = field(default_factory=list)
     surface: dict[str, float | None] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
 

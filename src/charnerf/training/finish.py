@@ -62,7 +62,8 @@ def finish_run(
         device=device,
         train_seconds=train_seconds,
     )
-    write_metrics(folder / "metrics.json", metrics)
+    size = sum(parameter.numel() for parameter in model.parameters())
+    write_metrics(folder / "metrics.json", {**metrics, "num_parameters": size, "steps": trainer.global_step})
     first = names_of(read_dataset(root), cfg.sampling.test_split)[0]
     with torch.no_grad():
         sources = load_character(root, first).sources.to(device)
