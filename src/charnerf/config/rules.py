@@ -47,6 +47,11 @@ def _some_term_counts(weights: Mapping[str, float]) -> Iterator[tuple[str, str]]
             yield f"loss.weights.{term}", f"found {weight}, expected 0 or more."
 
 
+def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
+    if isinstance(decay, int | float) and decay >= 1:
+        yield "averaging.decay", f"found {decay}, expected below 1: at 1 the average would never move."
+
+
 def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
     def rule(value: Any) -> Iterator[tuple[str, str]]:
         if isinstance(value, int | float) and value < 1:
@@ -60,6 +65,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss.weights",), _some_term_counts),
+    (("averaging.decay",), _average_moves),
     _at_least_one("data.views"),
     _at_least_one("data.train"),
     _at_least_one("data.val"),

@@ -65,6 +65,13 @@ class Sampling:
 
 
 @dataclass(frozen=True)
+class Averaging:
+    """Which weights are validated and saved: those of the last step, or their moving average."""
+
+    decay: Annotated[float, AtLeast(0)] | None
+
+
+@dataclass(frozen=True)
 class ModelSettings:
     """Settings of the model as a whole; what weights carry with them holds no other sizes."""
 
@@ -112,6 +119,7 @@ class RunConfig:
     quadrature: _part("charnerf.volume.quadrature")  # type: ignore[valid-type]
     renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
     sampling: Sampling
+    averaging: Averaging
     surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
     augmentation: _part("charnerf.data.augmentation", given=["used_views"])  # type: ignore[valid-type]
     loss: _part("charnerf.losses")  # type: ignore[valid-type]

@@ -23,6 +23,7 @@ from charnerf.errors import ConfigError
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.runs import build_model, build_part, build_renderer, save_config, save_weights
+from charnerf.training.averaging import WeightAverage
 from charnerf.training.clock import RunClock
 from charnerf.training.finish import finish_run
 from charnerf.training.guards import FiniteGuard, WhiteAlarm
@@ -145,8 +146,10 @@ def _surface_of(cfg: DictConfig, losses: WeightedLosses) -> SurfaceOf:
 
 def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
     """Lightning's trainer with our callbacks; the budget, not Lightning, bounds the run."""
+    averages = [] if cfg.averaging.decay is None else [WeightAverage(decay=cfg.averaging.decay)]
     callbacks = [
         clock,
+        *averages,  # before what reads the weights at validation
         BudgetBar(clock=clock),
         FiniteGuard(folder=folder),
         WhiteAlarm(),

@@ -1,0 +1,89 @@
+"""The average of the weights is what is validated and saved, and a resumed run has the same average."""
+
+import pytest
+import small_runs
+import torch
+
+from charnerf.config.composition import compose_config
+from charnerf.errors import ConfigError
+from charnerf.training.averaging import WeightAverage
+
+DECAY = 0.5
+STEPS = ("loss=opacity", "encoder=single", "scale.steps=6", "sampling.num_validations=3")
+AVERAGED = (*STEPS, f"averaging.decay={DECAY}")
+
+
+class WeightsOfSteps(small_runs.L.Callback):
+    """Keeps the weights after every step and those that validation sees."""
+
+    def __init__(self):
+        self.trained, self.validated = [], []
+
+    def on_train_batch_end(self, trainer, pl_module, *_):
+        self.trained.append(small_runs.weights(pl_module.model).clone())
+
+    def on_validation_epoch_start(self, trainer, pl_module):
+        self.validated.append(small_runs.weights(pl_module.model).clone())
+
+
+def watched(cfg, folder, **options):
+    run = small_runs.assemble(cfg, folder, **options)
+    watch = WeightsOfSteps()
+    run.trainer.callbacks.insert(0, watch)
+    start = small_runs.weights(run.module.model).clone()
+    return run, watch, start
+
+
+def averages(start, trained):
+    """The definition, step by step."""
+    average, found = start, []
+    for n, weights in enumerate(trained):
+        decay = min(DECAY, (1 + n) / (10 + n))
+        average = decay * average + (1 - decay) * weights
+        found.append(average)
+    return found
+
+
+def test_the_average_is_validated_and_saved_and_does_not_change_training(figure_dataset, tmp_path):
+    run, watch, start = watched(small_runs.smoke_config(figure_dataset, *AVERAGED), tmp_path / "run")
+    run.fit()
+    plain = small_runs.assemble(small_runs.smoke_config(figure_dataset, *STEPS), tmp_path / "plain").fit()
+    assert run.recorder.losses == plain.recorder.losses
+    expected = averages(start, watch.trained)
+    assert torch.equal(small_runs.weights(plain.module.model), watch.trained[-1])
+    torch.testing.assert_close(small_runs.weights(run.module.model), expected[-1])
+    for seen, average in zip(watch.validated, expected[1::2], strict=True):
+        torch.testing.assert_close(seen, average)
+    saved = torch.load(tmp_path / "run/checkpoints/last.ckpt", weights_only=True)["state_dict"]
+    state = {f"model.{name}": value for name, value in run.module.model.state_dict().items()}
+    assert saved.keys() == state.keys()
+    assert all(torch.equal(saved[name], state[name]) for name in saved)
+
+
+def test_a_resumed_run_has_the_same_average(figure_dataset, tmp_path):
+    cfg = small_runs.smoke_config(figure_dataset, *AVERAGED)
+    straight = small_runs.assemble(cfg, tmp_path / "straight").fit()
+    with pytest.raises(ConnectionAbortedError):
+        small_runs.assemble(cfg, tmp_path / "cut", cut_at=5).fit()
+    resumed = small_runs.assemble(cfg, tmp_path / "resumed").fit(tmp_path / "cut/checkpoints/last.ckpt")
+    assert resumed.recorder.losses == straight.recorder.losses[4:]
+    assert torch.equal(small_runs.weights(resumed.module.model), small_runs.weights(straight.module.model))
+    average = next(one for one in resumed.trainer.callbacks if isinstance(one, WeightAverage))
+    assert average.updates == 6
+
+
+def test_a_run_without_an_average_goes_on_with_one_from_its_weights(figure_dataset, tmp_path):
+    cfg = small_runs.smoke_config(figure_dataset, *STEPS)
+    with pytest.raises(ConnectionAbortedError):
+        small_runs.assemble(cfg, tmp_path / "cut", cut_at=5).fit()
+    checkpoint = tmp_path / "cut/checkpoints/last.ckpt"
+    held = torch.load(checkpoint, weights_only=True)["state_dict"]
+    run, watch, _ = watched(small_runs.smoke_config(figure_dataset, *AVERAGED), tmp_path / "on")
+    start = torch.cat([held[f"model.{name}"].reshape(-1) for name, _ in run.module.model.named_parameters()])
+    run.fit(checkpoint)
+    torch.testing.assert_close(small_runs.weights(run.module.model), averages(start, watch.trained)[-1])
+
+
+def test_a_decay_of_one_is_refused():
+    with pytest.raises(ConfigError, match=r"averaging\.decay.*below 1"):
+        compose_config(["scale=smoke", "averaging.decay=1.0"])
