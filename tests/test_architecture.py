@@ -20,6 +20,7 @@ LAYERS = (
         "capture",
         "drawings",
         "evaluation",
+        "finetuning",
         "meshing",
         "model_api",
         "reconstruction",
@@ -34,9 +35,13 @@ LAYERS = (
 LAYER_OF = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may import one another
     ("evaluation", "meshing"),
+    ("finetuning", "evaluation"),
+    ("finetuning", "model_api"),
+    ("finetuning", "runs"),
     ("model_api", "drawings"),
     ("model_api", "meshing"),
     ("reconstruction", "drawings"),
+    ("reconstruction", "finetuning"),
     ("reconstruction", "meshing"),
     ("reconstruction", "model_api"),
     ("runs", "model_api"),
