@@ -14,6 +14,7 @@ from charnerf.drawings.turnaround import Turnaround, read_turnaround
 from charnerf.errors import ConfigError, ShapeError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing.build import BuiltMesh, build_mesh
+from charnerf.meshing.texture import TEXTURE_SIZE, Texturing
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import Cameras, Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -26,6 +27,7 @@ CENTRE = (0.0, 0.0, 0.5 * HEIGHT)
 LEAST_DISTANCE = 4.0  # metres, of a camera from the centre
 MARGIN = 1.05  # of a picture's half-extent over the character's radius
 Picture = str | Path | np.ndarray
+TextureKind = Literal["drawings", "field", "vertex"]
 
 
 @final
@@ -141,17 +143,35 @@ class Hero:
         return torch.cat((straight.clamp(0.0, 1.0), opacity), dim=-1).cpu().numpy()
 
     def mesh(
-        self, *, resolution: int = 256, num_cameras: int = 8, faces: int | None = None
+        self,
+        *,
+        resolution: int = 256,
+        num_cameras: int = 8,
+        faces: int | None = None,
+        height: float = HEIGHT,
+        texture: TextureKind = "vertex",
+        texture_size: int = TEXTURE_SIZE,
     ) -> trimesh.Trimesh:
-        """Make a coloured mesh: world frame, metres, 2 m tall on z = 0; write it with `charnerf.save_mesh`.
+        """Make a coloured mesh: world frame, metres, on z = 0; write it with `charnerf.save_mesh`.
 
         Args:
             resolution: Grid points along the longest side.
             num_cameras: Cameras whose directions the density is averaged over (one where the density sees no
                 direction).
-            faces: Faces after decimation; None keeps all.
+            faces: Faces after decimation; None keeps all. A texture takes a second for 4000 faces.
+            height: Its exact height, m.
+            texture: vertex: colours at vertices, by the field. drawings: a base-colour texture from the
+                drawings, by the field where none sees the surface. field: a texture by the field alone.
+            texture_size: Texels a side.
         """
-        return self.build_mesh(resolution=resolution, num_cameras=num_cameras, faces=faces).mesh
+        return self.build_mesh(
+            resolution=resolution,
+            num_cameras=num_cameras,
+            faces=faces,
+            height=height,
+            texture=texture,
+            texture_size=texture_size,
+        ).mesh
 
     def build_mesh(
         self,
@@ -159,6 +179,9 @@ class Hero:
         resolution: int,
         num_cameras: int,
         faces: int | None,
+        height: float = HEIGHT,
+        texture: TextureKind = "vertex",
+        texture_size: int = TEXTURE_SIZE,
         on_points: Callable[[int], object] = lambda count: None,
     ) -> BuiltMesh:
         """As `mesh`, with how it came about: level, parts dropped, work left out, seconds."""
@@ -169,9 +192,19 @@ class Hero:
                 resolution=resolution,
                 num_cameras=num_cameras,
                 faces=faces,
-                height=HEIGHT,
+                height=height,
+                texturing=self.texturing(texture, texture_size),
                 on_points=on_points,
             )
+
+    def texturing(self, texture: TextureKind, size: int = TEXTURE_SIZE) -> Texturing | None:
+        """How a mesh of this character is textured; None for vertex colours."""
+        if texture == "vertex":
+            return None
+        if texture not in ("drawings", "field"):
+            raise ConfigError(f"texture: found '{texture}', expected drawings, field or vertex.")
+        views = self.views if self.turnaround is None else self.turnaround.detailed
+        return Texturing(colours=texture, size=size, views=views)
 
     def radius(self) -> float:
         """Radius around (0, 0, 1) that pictures frame, m: of the hull with a margin, at least 1.05 m."""

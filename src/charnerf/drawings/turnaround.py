@@ -16,6 +16,7 @@ from charnerf.types import Cameras, SourceViews
 
 SIDES = {"left": 90.0, "right": 270.0}  # azimuth of the camera that a side drawing stands for
 LEAST_AGREEMENT = 0.85  # IoU of the back's silhouette with the mirrored front's
+DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
 DISTANCE = 4.0  # metres, of the cameras, or more where the canvas is large
 
 
@@ -26,6 +27,7 @@ class Turnaround:
     Attributes:
         views: B = 1, V in the order front, side, back: orthographic, S x S.
         names: What each view is: "front", "side", "back".
+        detailed: The same views with as many pixels as the finest drawing has, within DETAIL; for textures.
         half_extent: Half the canvas' side, m.
         assumptions: What was done and assumed, plain sentences.
         warnings: What looks wrong, plain sentences.
@@ -33,6 +35,7 @@ class Turnaround:
     """
 
     views: SourceViews
+    detailed: SourceViews
     names: tuple[str, ...]
     half_extent: float
     assumptions: tuple[str, ...]
@@ -81,14 +84,15 @@ def read_turnaround(
     given = {"front": front, "side": side, "back": back}
     figures = [_prepare(view, source) for view, source in given.items()]
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
-    canvases = [place(figure.cutout.rgba, figure.box, extent=extent, size=size) for figure in figures]
-    cameras = source_cameras([0.0, SIDES[side_is], 180.0], extent, size)
+    canvases = _canvases(figures, extent, size)
+    azimuths = [0.0, SIDES[side_is], 180.0]
     assumptions, warnings = _told(figures, extent, size, side_is)
     warnings += _check_back(canvases[0][..., 3], canvases[2][..., 3], figures[2].drawing.name)
-    flags = torch.zeros(1, len(figures), dtype=torch.bool)
-    images = torch.from_numpy(np.stack(canvases)).permute(0, 3, 1, 2)[None].contiguous()
+    finest = max(round(2.0 * extent * figure.box.height / HEIGHT) for figure in figures)
+    detail = min(max(finest, DETAIL[0], size), max(DETAIL[1], size))
     return Turnaround(
-        views=SourceViews(images=images, cameras=cameras, present=~flags, mirrored=flags.clone()),
+        views=_source_views(canvases, azimuths, extent),
+        detailed=_source_views(_canvases(figures, extent, detail), azimuths, extent),
         names=tuple(given),
         half_extent=extent,
         assumptions=tuple(assumptions),
@@ -97,6 +101,19 @@ def read_turnaround(
             canvases, [f.view for f in figures], [f.drawing.name for f in figures], extent
         ),
     )
+
+
+def _canvases(figures: list[_Figure], extent: float, size: int) -> list[np.ndarray]:
+    """The figures on canvases (S, S, 4) of a size."""
+    return [place(figure.cutout.rgba, figure.box, extent=extent, size=size) for figure in figures]
+
+
+def _source_views(canvases: list[np.ndarray], azimuths_deg: list[float], extent: float) -> SourceViews:
+    """Canvases with their cameras, B = 1."""
+    flags = torch.zeros(1, len(canvases), dtype=torch.bool)
+    images = torch.from_numpy(np.stack(canvases)).permute(0, 3, 1, 2)[None].contiguous()
+    cameras = source_cameras(azimuths_deg, extent, images.shape[-1])
+    return SourceViews(images=images, cameras=cameras, present=~flags, mirrored=flags.clone())
 
 
 def source_cameras(azimuths_deg: list[float], extent: float, size: int) -> Cameras:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-Y_UP_SUFFIXES = (".glb", ".gltf", ".obj")  # the others we write are Z up, facing -Y, as our world is
+Y_UP_SUFFIXES = (".glb", ".gltf", ".obj", ".usdz")  # the others we write are Z up, facing -Y, as our world is
 
 
 def vertices_for(suffix: str, vertices: np.ndarray) -> np.ndarray:

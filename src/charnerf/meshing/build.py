@@ -11,8 +11,26 @@ import trimesh
 from charnerf.meshing.calibrate import LevelChoice, choose_level
 from charnerf.meshing.colour import colour_vertices
 from charnerf.meshing.density_grid import GridSampler
-from charnerf.meshing.extract import extract_surface, fit_height, simplify
+from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
+from charnerf.meshing.texture import Textured, Texturing, texture_mesh
 from charnerf.types import LeftOut, Scene, SourceViews
+
+
+@dataclass(frozen=True)
+class FoundSurface:
+    """A surface as it was found in a field, without colours.
+
+    Attributes:
+        extraction: The surface and what was removed from it.
+        choice: The evidence for its level; None where the caller gave it.
+        left_out: Grid points not evaluated.
+        seconds: Time it took.
+    """
+
+    extraction: Extraction
+    choice: LevelChoice | None
+    left_out: LeftOut
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -20,23 +38,27 @@ class BuiltMesh:
     """A coloured mesh and how it came about.
 
     Attributes:
-        mesh: World frame, metres, vertex colours sRGB.
+        mesh: World frame, metres; vertex colours (sRGB) or a base-colour texture.
+        surface: The same before its vertices were split at texture seams; `mesh` itself without a texture.
         level: Density of the surface, 1/m.
         choice: The evidence for the level; None where the caller gave it.
         num_extracted: Faces before decimation.
         num_floaters: Parts dropped.
         num_cavities: Hidden holes dropped.
         left_out: Grid points not evaluated.
+        textured: How the texture came about; None where there is none.
         seconds: Time it took.
     """
 
     mesh: trimesh.Trimesh
+    surface: trimesh.Trimesh
     level: float
     choice: LevelChoice | None
     num_extracted: int
     num_floaters: int
     num_cavities: int
     left_out: LeftOut
+    textured: Textured | None
     seconds: float
 
 
@@ -49,6 +71,7 @@ def build_mesh(
     faces: int | None = None,
     level: float | None = None,
     height: float | None = None,
+    texturing: Texturing | None = None,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> BuiltMesh:
     """Make a mesh of a character's field.
@@ -62,12 +85,29 @@ def build_mesh(
         level: Density of the surface, 1/m; None chooses it by rendered depths.
         height: Height to scale to, m, with the lowest point on z = 0; None leaves size and place as the
             field has them.
+        texturing: How to texture it; None gives vertex colours.
         on_points: Called with the number of grid points after each piece of work.
 
     Raises:
         DataError: If an argument is out of range or the hull empty.
         NumericalError: If the field is empty or not finite.
     """
+    found = find_surface(
+        scene, views, resolution=resolution, num_cameras=num_cameras, level=level, on_points=on_points
+    )
+    return finish_mesh(scene, found, faces=faces, height=height, texturing=texturing)
+
+
+def find_surface(
+    scene: Scene,
+    views: SourceViews | None,
+    *,
+    resolution: int,
+    num_cameras: int,
+    level: float | None = None,
+    on_points: Callable[[int], object] = lambda count: None,
+) -> FoundSurface:
+    """The surface of a field, all of its faces; arguments and errors as of `build_mesh`."""
     start = time.perf_counter()
     sampler = GridSampler(scene, resolution=resolution, num_cameras=num_cameras, on_points=on_points)
     choice = None
@@ -75,18 +115,38 @@ def build_mesh(
         choice = choose_level(sampler.evaluate_coarse(2 if resolution < 192 else 4), views)
         level = choice.chosen.level
     grid = sampler.evaluate_surface(level)
-    surface = extract_surface(grid, level, density_at=sampler.density_at)
-    mesh = surface.mesh if faces is None else simplify(surface.mesh, faces)
-    mesh = colour_vertices(scene, mesh)
+    extraction = extract_surface(grid, level, density_at=sampler.density_at)
+    return FoundSurface(extraction, choice, grid.left_out, time.perf_counter() - start)
+
+
+def finish_mesh(
+    scene: Scene,
+    found: FoundSurface,
+    *,
+    faces: int | None = None,
+    height: float | None = None,
+    texturing: Texturing | None = None,
+) -> BuiltMesh:
+    """Decimate, colour and scale a surface that was found; arguments and errors as of `build_mesh`."""
+    start = time.perf_counter()
+    extraction, textured = found.extraction, None
+    surface = extraction.mesh if faces is None else simplify(extraction.mesh, faces)
+    if texturing is None:
+        surface = mesh = colour_vertices(scene, surface)
+    else:
+        textured = texture_mesh(scene, surface, texturing)
+        mesh = textured.mesh
     if height is not None:
-        mesh = fit_height(mesh, height)
+        mesh, surface = fit_height(mesh, height), fit_height(surface, height)
     return BuiltMesh(
         mesh=mesh,
-        level=level,
-        choice=choice,
-        num_extracted=len(surface.mesh.faces),
-        num_floaters=surface.num_floaters,
-        num_cavities=surface.num_cavities,
-        left_out=grid.left_out,
-        seconds=time.perf_counter() - start,
+        surface=surface,
+        level=extraction.level,
+        choice=found.choice,
+        num_extracted=len(extraction.mesh.faces),
+        num_floaters=extraction.num_floaters,
+        num_cavities=extraction.num_cavities,
+        left_out=found.left_out,
+        textured=textured,
+        seconds=found.seconds + time.perf_counter() - start,
     )

@@ -1,4 +1,4 @@
-"""Vertex colours from the field, each seen straight on."""
+"""Colours from the field, each seen straight on."""
 
 from __future__ import annotations
 
@@ -12,6 +12,35 @@ from charnerf.types import Scene
 
 
 @torch.no_grad()
+def field_colours(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """The field's colours of surface points, each seen straight on, along minus its normal.
+
+    Args:
+        scene: One character's field.
+        points: (P, 3), m.
+        normals: Outward, unit, (P, 3).
+
+    Returns:
+        (P, 3), float64 in [0, 1], sRGB-encoded as the images are.
+
+    Raises:
+        NumericalError: If the field answers NaN or infinity.
+    """
+    device = scene.box_min.device
+    where = torch.tensor(np.asarray(points), dtype=torch.float32, device=device)
+    outward = torch.tensor(np.asarray(normals), dtype=torch.float32, device=device)
+    parts = zip(where.split(CHUNK), outward.split(CHUNK), strict=True)
+    colours = [scene.field(here, -normal).rgb for here, normal in parts]
+    rgb = torch.cat([where.new_zeros(0, 3), *colours]).double().cpu().numpy()
+    if not np.isfinite(rgb).all():
+        raise NumericalError(
+            f"colours: found {int((~np.isfinite(rgb)).sum())} of {rgb.size} values not finite, "
+            "expected colours in [0, 1]. "
+            "The weights are broken: load another checkpoint."
+        )
+    return rgb.clip(0.0, 1.0)
+
+
 def colour_vertices(scene: Scene, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Colour the vertices of a mesh by the field, looking at each along minus its normal.
 
@@ -26,19 +55,8 @@ def colour_vertices(scene: Scene, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     Raises:
         NumericalError: If the field answers NaN or infinity.
     """
-    device = scene.box_min.device
-    points = torch.tensor(np.asarray(mesh.vertices), dtype=torch.float32, device=device)
-    normals = torch.tensor(np.asarray(mesh.vertex_normals), dtype=torch.float32, device=device)
-    parts = zip(points.split(CHUNK), normals.split(CHUNK), strict=True)
-    rgb = torch.cat([scene.field(here, -normal).rgb for here, normal in parts]).double().cpu().numpy()
-    if not np.isfinite(rgb).all():
-        raise NumericalError(
-            f"vertex colours: found {int((~np.isfinite(rgb)).sum())} of {rgb.size} values not finite, "
-            "expected colours in [0, 1]. "
-            "The weights are broken: load another checkpoint."
-        )
-    rgba = np.full((len(rgb), 4), 255, np.uint8)
-    rgba[:, :3] = np.round(255.0 * rgb.clip(0.0, 1.0))
+    rgba = np.full((len(mesh.vertices), 4), 255, np.uint8)
+    rgba[:, :3] = np.round(255.0 * field_colours(scene, mesh.vertices, mesh.vertex_normals))
     coloured = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     coloured.visual = trimesh.visual.ColorVisuals(coloured, vertex_colors=rgba)
     return coloured

@@ -8,23 +8,26 @@ import numpy as np
 import trimesh
 
 from charnerf.errors import DataError
-from charnerf.meshing.axes import vertices_for
-from charnerf.meshing.extract import vertex_colours
 from charnerf.meshing.gltf import encode_glb, encode_gltf
+from charnerf.meshing.obj import encode_obj
+from charnerf.meshing.parts import MeshParts, parts_of, welded
+from charnerf.meshing.usd import encode_usdz
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usdz")
+TEXTURED_SUFFIXES = (".glb", ".gltf", ".obj", ".usdz")
 
 
 def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:
     """Write a mesh of our world frame (Z up, facing -Y, metres) to a file.
 
-    GLB, glTF and OBJ come out Y up and facing +Z, PLY and STL Z up and facing -Y. Vertex colours of the mesh
-    are sRGB-encoded, as pictures are; glTF gets them linear, as it demands, OBJ and PLY as they are, STL has
-    none.
+    GLB, glTF, OBJ and USDZ come out Y up and facing +Z, PLY and STL Z up and facing -Y. Vertex colours of the
+    mesh are sRGB-encoded, as pictures are; glTF and USDZ get them linear, as they demand, OBJ and PLY as they
+    are, STL has none. A texture lies inside of GLB, glTF and USDZ; OBJ gets an MTL and a PNG file beside it;
+    PLY and STL have none: PLY gets the texture's colours at the vertices.
 
     Args:
-        mesh: With vertex colours or without.
-        path: File to write; its suffix names the format: .glb, .gltf, .obj, .ply, .stl.
+        mesh: With vertex colours, a base-colour texture, or neither.
+        path: File to write; its suffix names the format: .glb, .gltf, .obj, .ply, .stl, .usdz.
 
     Returns:
         The path written.
@@ -32,6 +35,7 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:
     Raises:
         DataError: If the suffix is unknown, the folder missing, or the mesh has no faces or vertices that
             are not finite.
+        DependencyError: If the format needs a library that is missing (.usdz: extra `usd`).
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -45,7 +49,11 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:
         raise DataError(f"{path}: found a mesh without faces, expected a surface to write.")
     if not np.isfinite(mesh.vertices).all():
         raise DataError(f"{path}: found vertices that are not finite, expected finite positions in metres.")
-    write_aside(path, _encode(mesh, suffix, path.stem))
+    files = _encode(parts_of(mesh, suffix, path.stem), suffix)
+    for other, content in files.items():
+        if other != suffix:
+            write_aside(path.with_suffix(other), content)
+    write_aside(path, files[suffix])
     return path
 
 
@@ -62,16 +70,20 @@ def write_aside(path: Path, content: bytes) -> None:
         raise
 
 
-def _encode(mesh: trimesh.Trimesh, suffix: str, name: str) -> bytes:
-    """The file's bytes."""
-    vertices = vertices_for(suffix, mesh.vertices)
-    rgba = vertex_colours(mesh)
-    if suffix in (".glb", ".gltf"):
-        encode = encode_glb if suffix == ".glb" else encode_gltf
-        normals = vertices_for(suffix, mesh.vertex_normals)
-        return encode(vertices, normals, np.asarray(mesh.faces), None if rgba is None else rgba / 255.0, name)
-    turned = trimesh.Trimesh(vertices, mesh.faces, process=False)
-    if rgba is not None and suffix != ".stl":
+def _encode(parts: MeshParts, suffix: str) -> dict[str, bytes]:
+    """The files by suffix."""
+    if suffix == ".glb":
+        return {suffix: encode_glb(parts)}
+    if suffix == ".gltf":
+        return {suffix: encode_gltf(parts)}
+    if suffix == ".usdz":
+        return {suffix: encode_usdz(parts)}
+    if suffix == ".obj":
+        return encode_obj(parts)
+    bare = welded(parts)
+    turned = trimesh.Trimesh(bare.vertices, bare.faces, process=False)
+    if bare.rgba is not None and suffix != ".stl":
+        rgba = np.round(255.0 * bare.rgba).astype(np.uint8)
         turned.visual = trimesh.visual.ColorVisuals(turned, vertex_colors=rgba)
     content = turned.export(file_type=suffix[1:])
-    return content.encode() if isinstance(content, str) else bytes(content)  # type: ignore[arg-type]
+    return {suffix: content.encode() if isinstance(content, str) else bytes(content)}  # type: ignore[arg-type]

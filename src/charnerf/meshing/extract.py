@@ -190,7 +190,8 @@ def fit_height(mesh: trimesh.Trimesh, height: float) -> trimesh.Trimesh:
     low, high = mesh.bounds[:, 2]
     if not high > low:
         raise DataError("mesh: found no extent in height, expected a standing figure.")
+    normals = np.array(mesh.vertex_normals)  # those of vertices at texture seams belong to the whole surface
     scaled = mesh.copy()
-    vertices = (np.asarray(mesh.vertices) - (0.0, 0.0, low)) * (height / (high - low))
-    scaled.vertices = vertices
+    scaled.vertices = (np.asarray(mesh.vertices) - (0.0, 0.0, low)) * (height / (high - low))
+    scaled.vertex_normals = normals  # type: ignore[method-assign]
     return scaled

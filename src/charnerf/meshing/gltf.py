@@ -1,44 +1,31 @@
-"""glTF 2.0 with float positions, normals and linear vertex colours of 16 bits.
+"""glTF 2.0 with float positions and normals, and linear vertex colours of 16 bits or a base-colour texture.
 
 Written here because trimesh stores COLOR_0 in 8 bits, whose dark tones do not survive the linear scale, and
 names no material, so that viewers show bare metal.
 
-Source: Khronos glTF 2.0 specification, sections 3.7.2 (meshes: COLOR_0 is linear), 3.9 (materials), 4.4
-    (GLB).
+Source: Khronos glTF 2.0 specification, sections 3.7.2 (meshes: COLOR_0 is linear), 3.9 (materials:
+    baseColorTexture is sRGB), 4.4 (GLB).
 """
 
 import base64
 import json
 import struct
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from charnerf.data.color import linear_from_srgb
+from charnerf.meshing.parts import MeshParts
+
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
 _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
+_LINEAR, _MIPMAPPED, _CLAMP = 9729, 9987, 33071
 
 
-def linear_from_srgb(srgb: np.ndarray) -> np.ndarray:
-    """Linear light of sRGB-encoded values, any shape, both in [0, 1]. Source: IEC 61966-2-1."""
-    srgb = np.asarray(srgb, np.float64)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-
-
-def encode_glb(
-    vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, rgba: np.ndarray | None, name: str
-) -> bytes:
-    """One mesh as binary glTF.
-
-    Args:
-        vertices: (P, 3), m, in glTF's axes.
-        normals: (P, 3), unit, in glTF's axes.
-        faces: (T, 3), indices.
-        rgba: (P, 4), sRGB-encoded colours in [0, 1], or None.
-        name: Name of the node and the mesh.
-
-    Returns:
-        The file's bytes.
-    """
-    document, binary = _document(vertices, normals, faces, rgba, name)
+def encode_glb(parts: MeshParts) -> bytes:
+    """One mesh as binary glTF."""
+    document, binary = _document(parts)
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     chunks = (
@@ -50,59 +37,80 @@ def encode_glb(
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
-def encode_gltf(
-    vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, rgba: np.ndarray | None, name: str
-) -> bytes:
-    """One mesh as a self-contained glTF text, the buffer inside; arguments as `encode_glb`."""
-    document, binary = _document(vertices, normals, faces, rgba, name)
+def encode_gltf(parts: MeshParts) -> bytes:
+    """One mesh as a self-contained glTF text, buffer and picture inside."""
+    document, binary = _document(parts)
     document["buffers"][0]["uri"] = (
         "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
     )
     return json.dumps(document, indent=1).encode()
 
 
-def _document(
-    vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, rgba: np.ndarray | None, name: str
-) -> tuple[dict, bytes]:
+@dataclass
+class _Buffer:
+    """Pieces of the binary part and what describes them."""
+
+    blob: bytearray = field(default_factory=bytearray)
+    views: list[dict[str, Any]] = field(default_factory=list)
+    accessors: list[dict[str, Any]] = field(default_factory=list)
+
+    def add_raw(self, raw: bytes, **more: Any) -> int:
+        """Append bytes; returns the index of their view."""
+        self.views.append({"buffer": 0, "byteOffset": len(self.blob), "byteLength": len(raw), **more})
+        self.blob += raw + b"\0" * (-len(raw) % 4)
+        return len(self.views) - 1
+
+    def add(self, data: np.ndarray, component: int, kind: str, target: int, **more: Any) -> int:
+        """Append an array; returns the index of its accessor."""
+        view = self.add_raw(data.tobytes(), target=target)
+        entry = {"bufferView": view, "componentType": component, "count": len(data), "type": kind, **more}
+        self.accessors.append(entry)
+        return len(self.accessors) - 1
+
+
+def _document(parts: MeshParts) -> tuple[dict[str, Any], bytes]:
     """The JSON part and the buffer."""
-    positions = np.ascontiguousarray(vertices, "<f4")
+    buffer = _Buffer()
+    positions = np.ascontiguousarray(parts.vertices, "<f4")
     bounds = {"min": positions.min(0).tolist(), "max": positions.max(0).tolist()}
-    parts: list[tuple[np.ndarray, int, str, int, dict]] = [
-        (positions, _FLOAT, "VEC3", _ARRAY_BUFFER, bounds),
-        (_unit(normals), _FLOAT, "VEC3", _ARRAY_BUFFER, {}),
-        (np.ascontiguousarray(faces, "<u4").reshape(-1), _UINT, "SCALAR", _ELEMENT_BUFFER, {}),
-    ]
-    attributes = {"POSITION": 0, "NORMAL": 1}
-    if rgba is not None:
-        linear = np.concatenate((linear_from_srgb(rgba[:, :3]), rgba[:, 3:]), axis=1)
-        parts.append(
-            (np.round(65535 * linear).astype("<u2"), _USHORT, "VEC4", _ARRAY_BUFFER, {"normalized": True})
-        )
-        attributes["COLOR_0"] = 3
-    views, accessors, blob = [], [], b""
-    for index, (data, component, kind, target, more) in enumerate(parts):
-        raw = data.tobytes()
-        views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": len(raw), "target": target})
-        accessors.append(
-            {"bufferView": index, "componentType": component, "count": len(data), "type": kind, **more}
-        )
-        blob += raw + b"\0" * (-len(raw) % 4)
+    attributes = {
+        "POSITION": buffer.add(positions, _FLOAT, "VEC3", _ARRAY_BUFFER, **bounds),
+        "NORMAL": buffer.add(_unit(parts.normals), _FLOAT, "VEC3", _ARRAY_BUFFER),
+    }
+    surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
+    more: dict[str, Any] = {}
+    if parts.uv is not None:
+        downward = np.stack((parts.uv[:, 0], 1.0 - parts.uv[:, 1]), axis=1)
+        uv = np.ascontiguousarray(downward, "<f4")
+        attributes["TEXCOORD_0"] = buffer.add(uv, _FLOAT, "VEC2", _ARRAY_BUFFER)
+        surface["baseColorTexture"] = {"index": 0}
+        picture = {"name": parts.name, "mimeType": "image/png", "bufferView": buffer.add_raw(parts.png())}
+        filters = {"magFilter": _LINEAR, "minFilter": _MIPMAPPED, "wrapS": _CLAMP, "wrapT": _CLAMP}
+        more = {"textures": [{"sampler": 0, "source": 0}], "samplers": [filters], "images": [picture]}
+    elif parts.rgba is not None:
+        linear = np.concatenate((linear_from_srgb(parts.rgba[:, :3]), parts.rgba[:, 3:]), axis=1)
+        data = np.round(65535 * linear).astype("<u2")
+        attributes["COLOR_0"] = buffer.add(data, _USHORT, "VEC4", _ARRAY_BUFFER, normalized=True)
+    indices = np.ascontiguousarray(parts.faces, "<u4").reshape(-1)
+    primitive = {
+        "attributes": attributes,
+        "indices": buffer.add(indices, _UINT, "SCALAR", _ELEMENT_BUFFER),
+        "material": 0,
+        "mode": 4,
+    }
     document = {
         "asset": {"version": "2.0", "generator": "charnerf"},
         "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "name": name}],
-        "meshes": [
-            {"name": name, "primitives": [{"attributes": attributes, "indices": 2, "material": 0, "mode": 4}]}
-        ],
-        "materials": [
-            {"name": name, "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}}
-        ],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(blob)}],
+        "scenes": [{"name": parts.name, "nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": parts.name}],
+        "meshes": [{"name": parts.name, "primitives": [primitive]}],
+        "materials": [{"name": parts.name, "pbrMetallicRoughness": surface}],
+        **more,
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.blob)}],
     }
-    return document, blob
+    return document, bytes(buffer.blob)
 
 
 def _unit(normals: np.ndarray) -> np.ndarray:

@@ -1,0 +1,104 @@
+"""What a file of a mesh is made of, in the axes of its format."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from PIL import Image
+from scipy import ndimage
+
+from charnerf.meshing.axes import vertices_for
+from charnerf.meshing.extract import vertex_colours
+
+
+@dataclass(frozen=True)
+class MeshParts:
+    """One mesh, ready to be written.
+
+    Attributes:
+        name: Of node, mesh and files beside.
+        vertices: (P, 3), m.
+        normals: (P, 3).
+        faces: (T, 3), indices.
+        rgba: (P, 4), sRGB-encoded in [0, 1], or None.
+        uv: (P, 2), v upwards, or None.
+        picture: Base colour, sRGB-encoded; there exactly if uv is.
+    """
+
+    name: str
+    vertices: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    rgba: np.ndarray | None
+    uv: np.ndarray | None
+    picture: Image.Image | None
+
+    def png(self) -> bytes:
+        """The picture as a PNG file."""
+        assert self.picture is not None
+        stream = io.BytesIO()
+        self.picture.convert("RGB").save(stream, format="PNG")
+        return stream.getvalue()
+
+
+def parts_of(mesh: trimesh.Trimesh, suffix: str, name: str) -> MeshParts:
+    """Turn a mesh of the world frame into the axes of a format.
+
+    Args:
+        mesh: With vertex colours, a base-colour texture, or neither.
+        suffix: Of the format, such as ".glb".
+        name: Of the mesh.
+    """
+    rgba, picture = vertex_colours(mesh), texture_picture(mesh)
+    return MeshParts(
+        name=name,
+        vertices=vertices_for(suffix, mesh.vertices),
+        normals=vertices_for(suffix, mesh.vertex_normals),
+        faces=np.asarray(mesh.faces),
+        rgba=None if rgba is None else rgba / 255.0,
+        uv=None if picture is None else np.asarray(mesh.visual.uv, np.float64),  # type: ignore[union-attr]
+        picture=picture,
+    )
+
+
+def texture_picture(mesh: trimesh.Trimesh) -> Image.Image | None:
+    """The base-colour texture of a mesh that has one and lies in it, else None."""
+    visual = mesh.visual
+    if not isinstance(visual, trimesh.visual.TextureVisuals) or visual.uv is None:
+        return None
+    material = visual.material
+    found = getattr(material, "baseColorTexture", None)
+    return found if found is not None else getattr(material, "image", None)
+
+
+def welded(parts: MeshParts) -> MeshParts:
+    """The mesh with vertices that were split at texture seams joined again, coloured by the texture there."""
+    if parts.uv is None or parts.picture is None:
+        return parts
+    keys = np.concatenate((parts.vertices, parts.normals), axis=1)
+    _, first, joined = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    joined = joined.reshape(-1)
+    read = read_texture(parts.picture, parts.uv)
+    counts = np.bincount(joined)[:, None]
+    mean = np.stack([np.bincount(joined, weights=read[:, c]) for c in range(3)], axis=1) / counts
+    return MeshParts(
+        name=parts.name,
+        vertices=parts.vertices[first],
+        normals=parts.normals[first],
+        faces=joined[parts.faces],
+        rgba=np.concatenate((mean, np.ones((len(mean), 1))), axis=1),
+        uv=None,
+        picture=None,
+    )
+
+
+def read_texture(picture: Image.Image, uv: np.ndarray) -> np.ndarray:
+    """Colours (P, 3) in [0, 1] of a texture at places (P, 2), v upwards, between texels bilinearly."""
+    values = np.asarray(picture.convert("RGB"), np.float64) / 255.0
+    height, width = values.shape[:2]
+    at = np.stack(((1.0 - uv[:, 1]) * height - 0.5, uv[:, 0] * width - 0.5))
+    channels = [ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(3)]
+    return np.stack(channels, axis=1)

@@ -1,0 +1,183 @@
+"""Colours of surface points from the drawings that see them.
+
+A drawing sees a point if nothing of the mesh lies in between and the surface faces it. Only pixels well
+inside a figure's outline are believed: the others, which mix with the background or belong to something that
+hides the point, take the colour of the nearest believed one. Views are blended in two bands: smooth colour
+widely, so that drawings of unequal brightness meet without a seam, detail narrowly, so that it is not
+doubled.
+
+Letters: K points, V views, H, W image height and width.
+Source: Burt and Adelson 1983 (bands); Baumberg 2002 (two bands for textures of photographed objects).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+import torch
+import trimesh
+from scipy import ndimage
+from torch import Tensor
+
+from charnerf.data.raycast import RayCaster
+from charnerf.data.scene_mesh import surface_of_scene
+from charnerf.geometry.cameras import directions_to_points, pixel_centres, pixel_rays, project
+from charnerf.types import Cameras, SourceViews
+
+OPAQUE = 0.9  # alpha from which a pixel is the figure's alone
+EDGE = (
+    0.006  # metres, or one and a half pixels if that is more: so far inside its outline a figure is believed
+)
+SMOOTH = 0.04  # metres: standard deviation of the smooth band
+BESIDE = 0.012  # metres, or one pixel if that is more: so near to an occluder's outline a point is doubted
+BEHIND = 0.04  # metres that a point must lie behind an occluder to be doubted
+IN_FRONT = 0.01  # metres in front of a point that still are the point: bumps of the surface
+LEAST_COSINE = 0.1  # flatter than this a drawing shows streaks
+DOUBTED = 0.05  # weight of what is doubted, beside 1
+WIDE, NARROW = 3, 12  # powers of the cosine that weigh views in the smooth and in the fine band
+DEPTH_SIZE = 512  # pixels a side, at most, of the maps of depth
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What drawings say of points.
+
+    Attributes:
+        rgb: (K, 3), sRGB-encoded; zero where no drawing sees the point.
+        smooth: The smooth band alone, (K, 3).
+        trust: How well the point is seen, (K,): the cosine of the best view, less where doubted, 0 unseen.
+    """
+
+    rgb: np.ndarray
+    smooth: np.ndarray
+    trust: np.ndarray
+
+
+@final
+class Projector:
+    """Drawings and a mesh, ready to colour points of the mesh.
+
+    Args:
+        views: The drawings, B = 1; absent and mirrored views are not used.
+        mesh: The surface, world frame.
+    """
+
+    def __init__(self, views: SourceViews, mesh: trimesh.Trimesh) -> None:
+        used = (views.present & ~views.mirrored)[0]
+        self._cameras: Cameras = views.cameras[0][used].to("cpu", torch.float32)
+        images = views.images[0][used].to("cpu", torch.float32).movedim(1, -1).numpy()
+        bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        self._caster = RayCaster(surface_of_scene(bare))
+        pairs = [(self._cameras[v], images[v]) for v in range(len(images))]
+        self._bands = [_bands(image, _pixels_a_metre(camera)) for camera, image in pairs]
+        self._occluders = [self._occluder_depth(camera) for camera, _ in pairs]
+
+    def at(self, points: np.ndarray, normals: np.ndarray, face: np.ndarray) -> Drawn:
+        """Colours of points of the mesh.
+
+        Args:
+            points: (K, 3), m.
+            normals: Outward, (K, 3).
+            face: Triangles that the points lie on, (K,).
+        """
+        seen_by = [self._one_view(v, points, normals, face) for v in range(len(self._bands))]
+        fine, smooth = np.zeros((len(points), 3)), np.zeros((len(points), 3))
+        fine_sum, smooth_sum, trust = (np.zeros(len(points)) for _ in range(3))
+        for which, (cosine, belief, low, high) in seen_by:
+            narrow, wide = belief * cosine**NARROW, belief * cosine**WIDE
+            fine[which] += narrow[:, None] * high
+            smooth[which] += wide[:, None] * low
+            fine_sum[which] += narrow
+            smooth_sum[which] += wide
+            trust[which] = np.maximum(trust[which], belief * cosine)
+        smooth /= np.where(smooth_sum > 0, smooth_sum, 1.0)[:, None]
+        fine /= np.where(fine_sum > 0, fine_sum, 1.0)[:, None]
+        return Drawn((smooth + fine).clip(0.0, 1.0), smooth, trust)
+
+    def _one_view(
+        self, view: int, points: np.ndarray, normals: np.ndarray, face: np.ndarray
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Which points a view sees, and their cosines, beliefs, smooth and fine bands."""
+        camera = self._cameras[view]
+        tensor = torch.from_numpy(np.asarray(points, np.float32))
+        directions = directions_to_points(camera[None], tensor)[:, 0].numpy()
+        cosine = -(normals * directions).sum(1)
+        which = np.flatnonzero(cosine > LEAST_COSINE)
+        pixels, depth, in_front = (answer[which] for answer in project(camera, tensor))
+        inside = in_front & ((pixels >= 0) & (pixels <= _size_of(camera))).all(-1)
+        which, pixels, depth = which[inside.numpy()], pixels[inside], depth[inside]
+        clear = self._unhidden(camera, pixels, np.asarray(points)[which], face[which])
+        which, pixels, depth = which[clear], pixels[torch.from_numpy(clear)], depth[torch.from_numpy(clear)]
+        low, high, believed = self._bands[view]
+        belief = np.where(_nearest(believed, pixels, camera), 1.0, DOUBTED)
+        before = _nearest(self._occluders[view], pixels, camera) < depth.numpy() - BEHIND
+        belief = np.where(before, DOUBTED * belief, belief)
+        return which, (cosine[which], belief, _bilinear(low, pixels), _bilinear(high, pixels))
+
+    def _unhidden(self, camera: Cameras, pixels: Tensor, points: np.ndarray, face: np.ndarray) -> np.ndarray:
+        """Whether the ray through each pixel position meets its point (K, 3) first, (K,) bool."""
+        rays = pixel_rays(camera, pixels)
+        origins, directions = rays.origins.numpy(), rays.directions.numpy()
+        hits = self._caster.first_hits(origins, directions)
+        distances = ((points - origins) * directions).sum(1)
+        return (hits.triangles == face) | (hits.distances > distances - IN_FRONT)
+
+    def _occluder_depth(self, camera: Cameras) -> np.ndarray:
+        """Least depth of the mesh within BESIDE of each place of the picture, m; infinite where nothing is."""
+        share = min(1.0, DEPTH_SIZE / max(camera.width, camera.height))
+        width, height = round(camera.width * share), round(camera.height * share)
+        scale = torch.tensor((camera.width / width, camera.height / height))
+        rays = pixel_rays(camera, pixel_centres(width, height).reshape(-1, 2) * scale)
+        origins, directions = rays.origins.numpy(), rays.directions.numpy()
+        hits = self._caster.first_hits(origins, directions)
+        axis = -camera.world_from_camera[:3, 2].numpy()
+        centre = camera.world_from_camera[:3, 3].numpy()
+        to_origin = (origins - centre) @ axis
+        missed = hits.triangles < 0
+        depth = to_origin + np.where(missed, np.inf, hits.distances) * (directions @ axis)
+        reach = max(1, round(BESIDE * _pixels_a_metre(camera) * share))
+        return ndimage.minimum_filter(depth.reshape(height, width), size=2 * reach + 1, mode="nearest")
+
+
+def _bands(image: np.ndarray, pixels_a_metre: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Smooth and fine band (H, W, 3), both continued beyond what is believed, and that, (H, W) bool."""
+    opaque = image[..., 3] > OPAQUE
+    if not opaque.any():
+        opaque = image[..., 3] >= image[..., 3].max()
+    depth = ndimage.distance_transform_edt(np.pad(opaque, 1))[1:-1, 1:-1]
+    ridge = opaque & (depth >= ndimage.maximum_filter(depth, size=3))  # thin parts keep their middle
+    believed = (depth > max(1.5, EDGE * pixels_a_metre)) | ridge
+    nearest = tuple(ndimage.distance_transform_edt(~believed, return_distances=False, return_indices=True))
+    colour = image[..., :3].astype(np.float64)
+    sigma = max(1.0, SMOOTH * pixels_a_metre)
+    share = ndimage.gaussian_filter(believed.astype(np.float64), sigma)
+    blurred = [ndimage.gaussian_filter(colour[..., c] * believed, sigma) for c in range(3)]
+    smooth = np.stack(blurred, axis=-1) / np.maximum(share, 1e-12)[..., None]
+    return smooth[nearest], (colour - smooth)[nearest], believed
+
+
+def _pixels_a_metre(camera: Cameras) -> float:
+    """Of an orthographic camera exactly, of a pinhole at the axis of the world."""
+    focal = float(camera.focal.mean())
+    return focal if bool(camera.orthographic) else focal / float(camera.world_from_camera[:3, 3].norm())
+
+
+def _size_of(camera: Cameras) -> Tensor:
+    return torch.tensor((camera.width, camera.height), dtype=torch.float32)
+
+
+def _nearest(values: np.ndarray, pixels: Tensor, camera: Cameras) -> np.ndarray:
+    """Values (K,) of a map (h, w) that spans the camera's picture, at pixels (K, 2)."""
+    height, width = values.shape
+    column = (pixels[:, 0].numpy() * (width / camera.width)).astype(np.int64).clip(0, width - 1)
+    row = (pixels[:, 1].numpy() * (height / camera.height)).astype(np.int64).clip(0, height - 1)
+    return values[row, column]
+
+
+def _bilinear(values: np.ndarray, pixels: Tensor) -> np.ndarray:
+    """Values (K, 3) of a picture (H, W, 3) at pixels (K, 2); the edge's beyond it."""
+    at = np.stack((pixels[:, 1].numpy(), pixels[:, 0].numpy())) - 0.5
+    channels = [ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(3)]
+    return np.stack(channels, axis=1)
