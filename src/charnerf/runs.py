@@ -22,6 +22,7 @@ from charnerf.errors import CharNeRFError, ConfigError, DataError
 from charnerf.model_api import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.field import Field
+from charnerf.models.matrix_products import use_fastest_products
 from charnerf.volume.renderers.base import AbstractRenderer
 
 IMAGE_CHANNELS = 4  # RGBA
@@ -87,7 +88,7 @@ def build_renderer(cfg: DictConfig) -> AbstractRenderer:
 
 
 def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ()) -> Model:
-    """Load a trained model in eval mode.
+    """Load a trained model in eval mode; float32 products then run as `use_fastest_products` says.
 
     Args:
         path: A run folder, a .ckpt below one, a .safetensors; the released weights if None.
@@ -113,6 +114,7 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
         validate_model(cfg, trusted_targets=trusted_targets)
     except ConfigError as error:
         raise ConfigError(f"{file}: its config can not be used. {error}") from error
+    use_fastest_products()
     network = build_model(cfg)
     try:
         network.load_state_dict(state, strict=True)

@@ -22,6 +22,7 @@ from charnerf.data.surface import load_surface_mesh
 from charnerf.errors import ConfigError
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
+from charnerf.models.matrix_products import use_fastest_products
 from charnerf.runs import build_model, build_part, build_renderer, save_config, save_weights
 from charnerf.training.averaging import WeightAverage
 from charnerf.training.clock import RunClock
@@ -44,6 +45,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         folder: The run folder (design: On disk); made if it is missing.
     """
     keep_freed_memory()
+    use_fastest_products()
     logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)  # the bar and the report say the rest
     L.seed_everything(cfg.seed, verbose=False)
     folder.mkdir(parents=True, exist_ok=True)
