@@ -1,6 +1,7 @@
 """Train: `python train.py [group=option ...] [key=value ...]`; `-m` trains a grid and reports over it.
 
-Exit status: 0 done, 1 failed, 2 wrong call. HYDRA_FULL_ERROR=1 shows tracebacks.
+The same grid typed again skips its finished cells and goes on with the others. Exit status: 0 done, 1 failed, 2 wrong
+call. HYDRA_FULL_ERROR=1 shows tracebacks.
 """
 
 import sys
@@ -13,35 +14,39 @@ from omegaconf import DictConfig
 
 from charnerf.config import validate
 from charnerf.config.composition import run_door, trusted_by
-
-sweeps: set[Path] = set()
+from charnerf.config.grid import grid_command
 
 
 @hydra.main(version_base="1.3", config_path="conf", config_name="train")
 def train(cfg: DictConfig) -> None:
     """One job: training, evaluation, report."""
+    from charnerf.training.cells import run_cell
     from charnerf.training.run import run_training
 
     job = HydraConfig.get()
     validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
+    folder = Path(job.runtime.output_dir)
     if job.mode is RunMode.MULTIRUN:
-        sweeps.add(Path(job.sweep.dir))
-    run_training(cfg, Path(job.runtime.output_dir))
+        run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder)
+    else:
+        run_training(cfg, folder)
 
 
-def train_and_report() -> None:
-    """Train all jobs, then report over a sweep, also if some of its jobs failed."""
-    from charnerf.reporting.folder_report import write_folder_report
+def train_all() -> None:
+    """Train a run; or a grid, and report over it, also if some of its cells failed."""
+    from charnerf.training.grid import check_grid, report_grid
 
+    grid = grid_command(sys.argv[1:])
+    if grid is None:
+        train()
+        return
+    sys.argv[1:] = grid.arguments
     try:
         train()
     finally:
-        for folder in sweeps:
-            if any(folder.rglob("metrics.json")):
-                write_folder_report(folder)
+        report_grid(grid.folder)
+    check_grid(grid.folder)
 
 
 if __name__ == "__main__":
-    sys.exit(
-        run_door(train_and_report, arguments=sys.argv[1:], conf=Path(__file__).resolve().parent / "conf")
-    )
+    sys.exit(run_door(train_all, arguments=sys.argv[1:], conf=Path(__file__).resolve().parent / "conf"))

@@ -53,7 +53,7 @@ WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may impor
 }
 ONLY_IN = {  # foreign package: where it may be imported
     "hydra": ("config", "runs"),
-    "omegaconf": ("config", "runs", "commands", "training/run", "training/finish"),
+    "omegaconf": ("config", "runs", "commands", "training/run", "training/finish", "training/cells"),
     "lightning": ("training", "data/datamodule"),
     "typer": ("cli", "cli_options"),
 }

@@ -26,3 +26,7 @@ class NumericalError(CharNeRFError, ArithmeticError):
 
 class DependencyError(CharNeRFError, ImportError):
     """An optional dependency is missing; the message says what to install or do instead."""
+
+
+class GridError(CharNeRFError, RuntimeError):
+    """Cells of a grid are not done; the message names each one and why."""

@@ -91,7 +91,7 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
 
 def trusted_by(overrides: Sequence[str]) -> list[str]:
     """Modules that `trusted_targets=[...]` names on a command line."""
-    for override in _parse(overrides):
+    for override in parse_overrides(overrides):
         if override.key_or_group == "trusted_targets" and isinstance(override.value(), list):
             return [str(one) for one in override.value()]  # type: ignore[union-attr]
     return []
@@ -132,7 +132,7 @@ def _hydra(conf: Path) -> Iterator[None]:
         yield
 
 
-def _parse(overrides: Sequence[str]) -> list[Override]:
+def parse_overrides(overrides: Sequence[str]) -> list[Override]:
     """Read overrides; one that can not be read is named alone."""
     loader = GlobalHydra.instance().config_loader() if GlobalHydra.instance().is_initialized() else None
     parser = OverridesParser.create(config_loader=loader)  # type: ignore[arg-type]
@@ -149,7 +149,9 @@ def _parse(overrides: Sequence[str]) -> list[Override]:
 def _jobs(overrides: Sequence[str]) -> list[list[str]]:
     """The overrides of every job of a sweep."""
     try:
-        return [job for batch in BasicSweeper.split_arguments(_parse(overrides), None) for job in batch]
+        return [
+            job for batch in BasicSweeper.split_arguments(parse_overrides(overrides), None) for job in batch
+        ]
     except HydraException as error:
         raise ConfigError(f"{' '.join(overrides)}: {error}") from error
 
@@ -157,7 +159,7 @@ def _jobs(overrides: Sequence[str]) -> list[list[str]]:
 def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
     """Compose; a key that Hydra does not know is let in: `validate` names it beside all other problems."""
     accepted = []
-    for one in _parse(overrides):
+    for one in parse_overrides(overrides):
         options = GlobalHydra.instance().config_loader().get_group_options(one.key_or_group)
         if options and not one.is_delete() and not isinstance(one.value(), str | list | None):
             raise ConfigError(_no_option(one.key_or_group, str(one.value()), options))
