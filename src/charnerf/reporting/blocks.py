@@ -3,10 +3,12 @@
 import base64
 import html
 import io
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
@@ -17,8 +19,8 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f23; background: #fff; m
 h1 { font-size: 1.7rem; margin-bottom: .3rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
 p.lead { font-size: 1.1rem; }
 table { border-collapse: collapse; margin: .8rem 0; font-variant-numeric: tabular-nums;
-        display: block; overflow-x: auto; }
-th, td { padding: .3rem .7rem; text-align: right; border-bottom: 1px solid #e3e5e8; white-space: nowrap; }
+        display: block; overflow-x: auto; font-size: .92rem; }
+th, td { padding: .3rem .6rem; text-align: right; border-bottom: 1px solid #e3e5e8; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
 thead th { border-bottom: 2px solid #9aa0a8; font-weight: 600; }
 tbody tr:first-child td { font-weight: 600; }
@@ -78,7 +80,20 @@ class Picture:
     caption: str
 
 
-Block = Heading | Text | Bullets | Code | Table | Picture
+@dataclass(frozen=True)
+class Plot:
+    """A diagram that can be pointed at and zoomed.
+
+    Attributes:
+        figure: Data and layout as plotly's JSON writes them.
+        picture: The same, still: for Markdown, and for HTML where plotly is not installed.
+    """
+
+    figure: Mapping[str, Any]
+    picture: Picture
+
+
+Block = Heading | Text | Bullets | Code | Table | Picture | Plot
 
 
 @singledispatch
@@ -119,6 +134,11 @@ def _(block: Table, folder: Path) -> str:
 def _(block: Picture, folder: Path) -> str:
     link = block.path.relative_to(folder).as_posix().replace(" ", "%20")
     return f"![{block.caption}]({link})\n\n*{block.caption}*"
+
+
+@_markdown.register
+def _(block: Plot, folder: Path) -> str:
+    return _markdown(block.picture, folder)
 
 
 @singledispatch
@@ -168,6 +188,32 @@ def _(block: Picture) -> str:
     return f"<figure>{picture}<figcaption>{caption}</figcaption></figure>"
 
 
+@_html.register
+def _(block: Plot) -> str:
+    figure = json.dumps(block.figure, allow_nan=False).replace("<", "\\u003c")  # no text can end the script
+    return (
+        f'<figure class="plot"><div></div><script type="application/json">{figure}</script>'
+        f"<figcaption>{html.escape(block.picture.caption)}</figcaption></figure>"
+    )
+
+
+_DRAW = """
+document.querySelectorAll("figure.plot").forEach(figure => {
+  const plot = JSON.parse(figure.querySelector("script").textContent);
+  Plotly.newPlot(figure.querySelector("div"), plot.data, plot.layout, {responsive: true, displaylogo: false});
+});
+"""
+
+
+def plot_library() -> str | None:
+    """The script of plotly, to be embedded; None where the package is not installed."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError:
+        return None
+    return str(get_plotlyjs())
+
+
 def _embedded(path: Path) -> str:
     """A picture as a data URL: small files as they are, large ones as JPEG of high quality."""
     content, kind = path.read_bytes(), "png"
@@ -186,11 +232,15 @@ def to_markdown(blocks: Sequence[Block], folder: Path) -> str:
 
 
 def to_html(title: str, blocks: Sequence[Block]) -> str:
-    """A report as one HTML file that needs nothing else."""
+    """A report as one HTML file that needs nothing else; plots are still pictures where plotly is not installed."""
+    library = plot_library() if any(isinstance(block, Plot) for block in blocks) else None
+    if library is None:
+        blocks = [block.picture if isinstance(block, Plot) else block for block in blocks]
     body = "\n".join(_html(block) for block in blocks)
+    scripts = "" if library is None else f"<script>{library}</script>\n<script>{_DRAW}</script>\n"
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
-        f"<body>\n{body}\n</body>\n</html>\n"
+        f"<body>\n{body}\n{scripts}</body>\n</html>\n"
     )

@@ -1,42 +1,25 @@
-"""One report over all runs below a folder: one table, one diagram of their curves."""
+"""One report over all runs below a folder: tables, diagrams, pictures, and which differences hold."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from charnerf.errors import DataError
-from charnerf.reporting.blocks import Block, Heading, Picture, Table, Text
-from charnerf.reporting.parts import (
-    BASELINE_NAMES,
-    COLUMNS,
-    MAX_SHEETS,
-    NONE,
-    cell,
-    character_table,
-    metric_cells,
-    read_metrics,
-    seconds_text,
-    sheets_of,
-    verdict,
-    write_report,
-)
-from charnerf.reporting.plots import Curve, plot_curves, read_curve
-
-
-def _overrides(run: Path) -> str:
-    """What the run's command line changed, as Hydra noted it; empty where it did not."""
-    path = run / ".hydra" / "overrides.yaml"
-    if not path.is_file():
-        return ""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return " ".join(line[2:].strip().strip("'\"") for line in lines if line.startswith("- "))
+from charnerf.reporting.blocks import Block, Heading, Text
+from charnerf.reporting.by_angle import by_angle
+from charnerf.reporting.characters import characters
+from charnerf.reporting.comparison import best_row, comparison, costs, sorted_rows, unfinished
+from charnerf.reporting.matrix import matrix
+from charnerf.reporting.parts import verdict, write_report
+from charnerf.reporting.rows import Row, Run, common_overrides, group_rows, read_runs, read_unfinished
+from charnerf.reporting.trends import trends
+from charnerf.reporting.verdicts import significance
 
 
 def write_folder_report(folder: str | Path) -> Path:
-    """Write report.md and report.html over all runs below a folder: one table, one diagram of their curves.
+    """Write report.md and report.html over all runs below a folder.
 
     Args:
-        folder: Any folder; every metrics.json below it is a run.
+        folder: Any folder; every metrics.json below it is a run. Runs that differ in their seed alone are one row.
 
     Returns:
         The Markdown file.
@@ -45,66 +28,36 @@ def write_folder_report(folder: str | Path) -> Path:
         DataError: If there is no run below it, or one of its files is unreadable.
     """
     folder = Path(folder)
-    runs = sorted(path.parent for path in folder.rglob("metrics.json"))
+    runs = read_runs(folder)
     if not runs:
         raise DataError(
             f"{folder}: found no metrics.json below it, expected finished runs; train or evaluate first."
         )
-    found = [(run, read_metrics(run / "metrics.json")) for run in runs]
-    found.sort(key=lambda pair: -(pair[1]["psnr_foreground"] or 0.0))
-    curves: dict[str, Curve] = {}
-    rows = []
-    for run, metrics in found:
-        name = run.relative_to(folder).as_posix() if run != folder else run.name
-        overrides = _overrides(run)
-        path = run / "curve.csv"
-        if path.is_file():
-            curves[f"{name} {overrides}".strip()] = read_curve(path)
-        spent = metrics["seconds"]
-        rows.append(
-            [
-                name,
-                overrides or NONE,
-                *metric_cells(metrics),
-                *(seconds_text(spent.get(key)) for key in ("train", "render_per_frame", "mesh")),
-                cell(metrics.get("peak_memory_mib"), "{:.0f}"),
-                f"{metrics['split']} {metrics['num_characters']} x {metrics['num_views']}",
-            ]
-        )
-    header = ["run", "options", *(title for title, _ in COLUMNS.values())]
-    header += ["training", "a frame", "a mesh", "MiB", "characters x views"]
-    title = f"charnerf: {len(found)} runs in {folder.resolve().name}"
-    blocks: list[Block] = [Heading(title, 1), Text(_folder_verdict(found, folder), lead=True)]
-    blocks.append(Table(header, rows, emphasis=True))
-    blocks += _folder_baselines(found)
-    picture = plot_curves(curves, folder / "report_curves.png")
-    blocks.append(Heading("Error against training time"))
-    blocks.append(
-        Picture(picture, "Validation PSNR of every run") if picture else Text("No run has a curve.csv.")
-    )
-    for run, metrics in found:
-        name = run.relative_to(folder).as_posix() if run != folder else run.name
-        sheets = sheets_of(run, character_table(metrics)[0], metrics)
-        middle = list(sheets.values())[len(sheets) // 2 : len(sheets) // 2 + 1]
-        if middle and len(found) <= MAX_SHEETS:
-            blocks += [Heading(f"{name} {_overrides(run)}".strip()), *middle]
+    rows = sorted_rows(group_rows(runs))
+    title = f"charnerf: {len(rows)} rows, {len(runs)} runs in {folder.resolve().name}"
+    blocks: list[Block] = [Heading(title, 1), Text(_lead(rows, runs), lead=True)]
+    blocks += unfinished(read_unfinished(folder))
+    blocks += comparison(rows)
+    blocks += costs(rows)
+    blocks += significance(rows)
+    blocks += trends(rows, folder)
+    blocks += by_angle(rows, folder)
+    blocks += matrix(rows, folder)
+    blocks += characters(rows)
     return write_report(folder, title, blocks)
 
 
-def _folder_verdict(found: Sequence[tuple[Path, Mapping[str, Any]]], folder: Path) -> str:
-    """Which run is best."""
-    run, metrics = found[0]
-    name = run.relative_to(folder).as_posix() if run != folder else run.name
-    options = _overrides(run)
-    return f"Best on the foreground: {name}{f' ({options})' if options else ''}. {verdict(metrics)}"
-
-
-def _folder_baselines(found: Sequence[tuple[Path, Mapping[str, Any]]]) -> list[Block]:
-    """The baselines, once for every set of characters and views that the runs were measured on."""
-    rows: dict[tuple[str, ...], list[str]] = {}
-    for _, metrics in found:
-        for name, scores in metrics.get("baselines", {}).items():
-            cells = [f"{BASELINE_NAMES.get(name, name)}, {metrics['split']}", *metric_cells(scores)]
-            rows.setdefault(tuple(cells), cells)
-    header = ["baseline", *(title for title, _ in COLUMNS.values())]
-    return [Heading("Without learning"), Table(header, list(rows.values()))] if rows else []
+def _lead(rows: Sequence[Row], runs: Sequence[Run]) -> str:
+    """Which row is best, and what all of them share."""
+    best = best_row(rows)
+    shared = common_overrides(runs)
+    told = f" All runs: {' '.join(shared)}." if shared else ""
+    measured = {
+        (run.metrics["split"], run.metrics["num_characters"], run.metrics["num_views"]) for run in runs
+    }
+    mixed = (
+        " The runs were not measured on the same views: their figures do not compare."
+        if len(measured) > 1
+        else ""
+    )
+    return f"Best on the foreground: {best.label}. {verdict(best.runs[0].metrics)}{told}{mixed}"

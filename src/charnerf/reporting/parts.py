@@ -8,7 +8,7 @@ from typing import Any
 from charnerf.data.layout import write_text_atomically
 from charnerf.errors import DataError
 from charnerf.evaluation.scores import METRIC_KEYS
-from charnerf.reporting.blocks import Block, Picture, Table, to_html, to_markdown
+from charnerf.reporting.blocks import Block, Picture, Plot, Table, Text, plot_library, to_html, to_markdown
 
 COLUMNS = {
     "psnr": ("PSNR ↑ dB", "{:.2f}"),
@@ -20,10 +20,18 @@ COLUMNS = {
     "chamfer_mm": ("Chamfer ↓ mm", "{:.1f}"),
     "f_score": ("F-score 2 cm ↑", "{:.3f}"),
 }
-BASELINE_NAMES = {"visual_hull": "visual hull (carved, coloured)", "white": "white picture"}
+BASELINE_NAMES = {
+    "visual_hull": "visual hull (carved, coloured)",
+    "nearest": "nearest training character (coloured)",
+    "white": "white picture",
+}
 MAX_SHEETS = 12
 _NEEDED = (*METRIC_KEYS, "split", "num_characters", "num_views", "by_azimuth", "per_character", "seconds")
 NONE = "-"
+STILL = (
+    "The diagrams of report.html are still pictures, because plotly is not installed. For ones to point at and zoom: "
+    "pip install 'charnerf[report]' (in a clone: pip install -e '.[report]'), then `charnerf report` again."
+)
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
@@ -112,7 +120,9 @@ def sheets_of(folder: Path, worst_first: Sequence[str], metrics: Mapping[str, An
 
 
 def write_report(folder: Path, title: str, blocks: Sequence[Block]) -> Path:
-    """Write both forms, each in one step."""
+    """Write both forms, each in one step; plots stay still where plotly is not installed, which the report says."""
+    if any(isinstance(block, Plot) for block in blocks) and plot_library() is None:
+        blocks = [*blocks, Text(STILL)]
     write_text_atomically(folder / "report.html", to_html(title, blocks))
     write_text_atomically(folder / "report.md", to_markdown(blocks, folder))
     return folder / "report.md"

@@ -10,9 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from charnerf.errors import DataError
+from charnerf.reporting.interactive import PALETTE, Line
 
 _OURS, _HULL, _FOREGROUND, _GREY = "#1f5fa8", "#b8601a", "#3f8f5f", "#8a9099"
-_MANY = (_OURS, _HULL, _FOREGROUND, "#7a4fa3", "#b03a5b", "#4d7f91", "#8a7a1f", "#555b63")
 _DASHES = ("-", "--", ":", "-.")
 
 Curve = list[dict[str, float]]
@@ -67,7 +67,7 @@ def _tidy(axes: Axes, *, x: str, y: str) -> None:
         axes.spines[side].set_visible(False)
 
 
-def _points(curve: Curve, key: str) -> tuple[list[float], list[float]]:
+def curve_points(curve: Curve, key: str) -> tuple[list[float], list[float]]:
     """Seconds and values of a column, where both are there."""
     rows = [row for row in curve if "seconds" in row and key in row]
     return [row["seconds"] for row in rows], [row[key] for row in rows]
@@ -81,14 +81,14 @@ def plot_training(curve: Curve, path: Path) -> Path | None:
             ("val_psnr", "whole picture", _OURS),
             ("val_psnr_foreground", "foreground", _FOREGROUND),
         )
-        if _points(curve, key)[0]
+        if curve_points(curve, key)[0]
     ]
     if not lines:
         return None
     figure = Figure(figsize=(7.5, 4.0), layout="constrained")
     axes = figure.add_subplot()
     for key, label, colour in lines:
-        seconds, values = _points(curve, key)
+        seconds, values = curve_points(curve, key)
         axes.plot(seconds, values, color=colour, marker="o", markersize=3.5, linewidth=1.8, label=label)
         axes.annotate(
             f"{values[-1]:.1f}", (seconds[-1], values[-1]), xytext=(5, 3), textcoords="offset points"
@@ -131,26 +131,52 @@ def plot_angles(metrics: Mapping[str, Any], path: Path) -> Path:
     return _save(figure, path)
 
 
-def plot_curves(curves: Mapping[str, Curve], path: Path) -> Path | None:
-    """Validation PSNR of many runs against training seconds; None where no run has any."""
-    drawn = {name: _points(curve, "val_psnr") for name, curve in curves.items()}
-    drawn = {name: points for name, points in drawn.items() if points[0]}
-    if not drawn:
-        return None
-    figure = Figure(figsize=(10.0, 4.6), layout="constrained")
+def plot_lines(panels: Mapping[str, Mapping[str, Sequence[Line]]], path: Path, *, x: str) -> Path:
+    """Panels side by side with one legend: by title of the vertical axis, then by row, its lines."""
+    figure = Figure(figsize=(4.6 * len(panels) + 1.0, 4.6), layout="constrained")
+    every = figure.subplots(1, len(panels), squeeze=False)[0]
+    order = list(dict.fromkeys(row for rows in panels.values() for row in rows))
+    for axes, (title, rows) in zip(every, panels.items(), strict=True):
+        for row, lines in rows.items():
+            index = order.index(row)
+            look = {
+                "color": PALETTE[index % len(PALETTE)],
+                "linestyle": _DASHES[index // len(PALETTE) % len(_DASHES)],
+            }
+            for number, (xs, ys) in enumerate(lines):
+                axes.plot(xs, ys, **look, marker="o", markersize=2.5, label=row if number == 0 else None)
+        _tidy(axes, x=x, y=title)
+    handles, labels = every[0].get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside lower center", ncols=4)
+    return _save(figure, path)
+
+
+def plot_boxes(
+    rows: Mapping[str, Mapping[str, Sequence[float]]], path: Path, *, x: str, y: str, bins: Sequence[str]
+) -> Path:
+    """Box plots side by side in every bin: by row, then by bin, the values."""
+    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
     axes = figure.add_subplot()
-    for index, (name, (seconds, values)) in enumerate(drawn.items()):
-        dash = _DASHES[index // len(_MANY) % len(_DASHES)]
-        axes.plot(
-            seconds,
-            values,
-            dash,
-            color=_MANY[index % len(_MANY)],
-            marker="o",
-            markersize=3,
-            linewidth=1.6,
-            label=name,
+    width = 0.8 / max(len(rows), 1)
+    for index, (row, by_bin) in enumerate(rows.items()):
+        places = [place for place, name in enumerate(bins) if by_bin.get(name)]
+        if not places:
+            continue
+        look = {"color": PALETTE[index % len(PALETTE)]}
+        drawn = axes.boxplot(
+            [list(by_bin[bins[place]]) for place in places],
+            positions=[place - 0.4 + width * (index + 0.5) for place in places],
+            widths=0.85 * width,
+            manage_ticks=False,
+            patch_artist=True,
+            boxprops={"facecolor": look["color"], "alpha": 0.45},
+            medianprops=look,
+            whiskerprops=look,
+            capprops=look,
+            flierprops={"marker": ".", "markersize": 3, "markeredgecolor": look["color"]},
         )
-    _tidy(axes, x="training time, seconds (evaluation excluded)", y="validation PSNR, dB")
-    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))
+        drawn["boxes"][0].set_label(row)
+    axes.set_xticks(range(len(bins)), bins)
+    _tidy(axes, x=x, y=y)
+    figure.legend(frameon=False, fontsize=8, loc="outside lower center", ncols=4)
     return _save(figure, path)

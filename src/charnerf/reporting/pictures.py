@@ -1,0 +1,71 @@
+"""Sheets of pictures: labelled columns and rows, on white."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from charnerf.evaluation.pictures import save_picture
+
+CELL = 128  # pixels
+_INK = (60, 60, 60)
+_HEADER, _LABEL = 18, 150
+_GAP = 6
+
+
+def on_white(picture: Image.Image) -> Image.Image:
+    """A picture with alpha on white, RGB."""
+    rgba = picture.convert("RGBA")
+    white = Image.new("RGBA", rgba.size, "white")
+    return Image.alpha_composite(white, rgba).convert("RGB")
+
+
+def open_on_white(path: Path) -> Image.Image:
+    """A picture file on white, RGB."""
+    with Image.open(path) as picture:
+        return on_white(picture)
+
+
+def from_floats(rgba: np.ndarray) -> Image.Image:
+    """An array (H, W, 4) of floats in [0, 1] on white."""
+    return on_white(Image.fromarray((np.clip(rgba, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)))
+
+
+def save_matrix(
+    path: Path, columns: Sequence[str], rows: Sequence[tuple[str, Sequence[Image.Image | None]]]
+) -> Path:
+    """Write a sheet: a picture or nothing in every cell; a label's lines stand before its row.
+
+    Args:
+        path: PNG file.
+        columns: Titles; long ones are cut.
+        rows: Label (lines of text) and pictures.
+    """
+    font = ImageFont.load_default(11)
+    size = (_LABEL + len(columns) * (CELL + _GAP), _HEADER + len(rows) * (CELL + _GAP))
+    sheet = Image.new("RGB", size, "white")
+    pen = ImageDraw.Draw(sheet)
+    for column, title in enumerate(columns):
+        pen.text((_LABEL + column * (CELL + _GAP), 2), _cut(title, font, CELL), _INK, font)
+    for row, (label, pictures) in enumerate(rows):
+        top = _HEADER + row * (CELL + _GAP)
+        lines = [_cut(line, font, _LABEL - 8) for line in label.splitlines()]
+        pen.multiline_text((4, top + CELL // 2 - 7 * len(lines)), "\n".join(lines), _INK, font)
+        for column, picture in enumerate(pictures):
+            if picture is not None:
+                small = picture.width < CELL and CELL % picture.width == 0
+                how = Image.Resampling.NEAREST if small else Image.Resampling.LANCZOS
+                sheet.paste(picture.resize((CELL, CELL), how), (_LABEL + column * (CELL + _GAP), top))
+    save_picture(path, sheet)
+    return path
+
+
+def _cut(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: int) -> str:
+    """Text that fits into a width, its middle left out where it is longer."""
+    kept = len(text)
+    shown = text
+    while kept > 4 and font.getlength(shown) > width:
+        kept -= 1
+        shown = f"{text[: (kept + 1) // 2]}…{text[len(text) - kept // 2 :]}"
+    return shown

@@ -1,0 +1,142 @@
+"""Which differences between rows hold, as a table and in words."""
+
+from collections.abc import Mapping, Sequence
+from statistics import fmean
+
+from charnerf.reporting.blocks import Block, Bullets, Heading, Table, Text
+from charnerf.reporting.rows import Row
+from charnerf.reporting.significance import LEVEL, RESAMPLES, Difference, compare_rows
+
+METRICS = {
+    "psnr": ("PSNR", "{:.2f} dB"),
+    "psnr_foreground": ("foreground PSNR", "{:.2f} dB"),
+    "ssim": ("SSIM", "{:.3f}"),
+    "silhouette_iou": ("IoU", "{:.3f}"),
+}
+ATTENTION, RIVALS, JUDGED = (
+    "charnerf",
+    ("pixelnerf", "no_mha", "no_view"),
+    ("psnr", "psnr_foreground", "ssim"),
+)
+
+
+def scores_by_character(row: Row, key: str) -> dict[str, float]:
+    """A metric of every character, averaged over the row's seeds."""
+    found: dict[str, list[float]] = {}
+    for run in row.runs:
+        for name, scores in run.metrics["per_character"].items():
+            if scores.get(key) is not None:
+                found.setdefault(name, []).append(scores[key])
+    return {name: fmean(values) for name, values in found.items()}
+
+
+def differences(rows: Sequence[Row]) -> dict[str, list[Difference]]:
+    """All pairs of rows by metric, p-values corrected over the pairs of a metric."""
+    return {key: compare_rows({row.label: scores_by_character(row, key) for row in rows}) for key in METRICS}
+
+
+def significance(rows: Sequence[Row]) -> list[Block]:
+    """Which differences hold: in words, then every pair."""
+    if len(rows) < 2:
+        return []
+    found = differences(rows)
+    counts = sorted({one.num_characters for each in found.values() for one in each})
+    if not counts:
+        return [
+            Heading("Which differences hold"),
+            Text("The rows share no test character: nothing can be paired."),
+        ]
+    blocks: list[Block] = [Heading("Which differences hold")]
+    told = (
+        f"Paired bootstrap over {' or '.join(map(str, counts))} test characters, {RESAMPLES:,} resamples, seeds averaged first; a"
+        " difference holds where p, corrected over the pairs by Holm, is below 0.05. Intervals are 95 %, of each pair alone."
+        " Resampling characters says nothing about training noise: for that, several seeds."
+    )
+    blocks.append(Text(told))
+    smallest = max(len(each) for each in found.values()) * 2.0 ** (1 - counts[-1])
+    if smallest >= 1.0 - LEVEL:
+        told = (
+            f"So few characters can not decide so many pairs at once: p is at least {min(1.0, smallest):.2g}."
+        )
+        blocks.append(Text(f"{told} The intervals of single pairs still tell."))
+    verdict = attention_verdict(rows, found)
+    if verdict:
+        blocks.append(Text(verdict))
+    order = [row.label for row in rows]
+    blocks.append(Bullets([sentence(key, found[key], order) for key in METRICS]))
+    return [*blocks, _table(found)]
+
+
+def sentence(key: str, pairs: Sequence[Difference], order: Sequence[str]) -> str:
+    """What holds in one metric, by row."""
+    title, form = METRICS[key]
+    parts = []
+    for label in order:
+        ahead = [one for one in pairs if one.first == label and one.holds]
+        if ahead:
+            parts.append(
+                f"{label} is ahead of {', '.join(f'{one.second} by {form.format(one.mean)}' for one in ahead)}"
+            )
+    open_ = sum(not one.holds for one in pairs)
+    if not parts:
+        return f"{title}: no difference holds ({open_} pairs)."
+    rest = (
+        f"; the other {open_} of {len(pairs)} pairs can not be told apart"
+        if open_
+        else "; that is every pair"
+    )
+    return f"{title}: {'; '.join(parts)}{rest}."
+
+
+def attention_verdict(rows: Sequence[Row], found: Mapping[str, Sequence[Difference]]) -> str | None:
+    """Whether view attention earns its place against the rows without; None where the grid has not both."""
+    labels = {row.experiment: row.label for row in rows if row.experiment is not None}
+    rivals = [labels[name] for name in RIVALS if name in labels]
+    if ATTENTION not in labels or not rivals:
+        return None
+    ours = labels[ATTENTION]
+    told: dict[str, list[str]] = {"ahead": [], "behind": [], "undecided": []}
+    for rival in rivals:
+        states: dict[str, list[str]] = {}
+        for key in JUDGED:
+            pair = next((one for one in found[key] if {one.first, one.second} == {ours, rival}), None)
+            if pair is not None:
+                state = "undecided" if not pair.holds else "ahead" if pair.first == ours else "behind"
+                states.setdefault(state, []).append(METRICS[key][0])
+        for state, names in states.items():
+            told[state].append(f"against {rival} ({', '.join(names)})")
+    parts = [f"{state} {', '.join(names)}" for state, names in told.items() if names]
+    earned = parts and not told["behind"] and not told["undecided"]
+    start = (
+        "View attention earns its place here"
+        if earned
+        else "View attention does not clearly earn its place here"
+    )
+    return f"{start}: {ours} is {'; '.join(parts)}." if parts else None
+
+
+def _table(found: Mapping[str, Sequence[Difference]]) -> Table:
+    """Every pair: difference, interval and corrected p in each metric; a star where it holds."""
+    pairs = list(
+        dict.fromkeys(tuple(sorted((one.first, one.second))) for each in found.values() for one in each)
+    )
+    rows = []
+    for first, second in pairs:
+        cells = []
+        for key, each in found.items():
+            pair = next((one for one in each if {one.first, one.second} == {first, second}), None)
+            cells.append(
+                "-"
+                if pair is None
+                else _cell(pair, form=METRICS[key][1], sign=1.0 if pair.first == first else -1.0)
+            )
+        rows.append([f"{first} - {second}", *cells])
+    return Table(["pair", *(METRICS[key][0] for key in found)], rows)
+
+
+def _cell(pair: Difference, *, form: str, sign: float) -> str:
+    low, high = sorted((sign * pair.low, sign * pair.high))
+    numbers = form.split("}", maxsplit=1)[0] + "}"
+    plus = numbers.replace(":", ":+")
+    told = f"{plus.format(sign * pair.mean)} ({numbers.format(low)} to {numbers.format(high)}), p {pair.p_value:.2g}"
+    return f"{told} *" if pair.holds else told
