@@ -40,12 +40,14 @@ class Model:
         renderer: How its scenes are rendered.
         config: The model's part of the config that it was trained with (an OmegaConf section).
         source: The file that it came from.
+        note: What that file says about itself, such as that it is for one character; None if nothing.
     """
 
     network: CharNeRF
     renderer: AbstractRenderer
     config: Any
     source: Path
+    note: str | None = None
 
     @property
     def image_size(self) -> int:

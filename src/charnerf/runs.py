@@ -124,17 +124,22 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
             "expected both from one run and one version of charnerf."
         ) from error
     return Model(
-        network=network.requires_grad_(False).eval(), renderer=build_renderer(cfg), config=cfg, source=file
+        network=network.requires_grad_(False).eval(),
+        renderer=build_renderer(cfg),
+        config=cfg,
+        source=file,
+        note=_note_of(file),
     )
 
 
-def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig) -> Path:
+def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig, *, note: str | None = None) -> Path:
     """Write a model's weights with the model's part of its config, beside and then renamed.
 
     Args:
         path: A .safetensors.
         model: The network; its buffers and weights are written as they are.
         cfg: The run's config; data, trainer and paths are not written.
+        note: What a user of the file has to know, such as what it is for; `load` hands it on.
 
     Returns:
         The file.
@@ -144,14 +149,11 @@ def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig) -> Path:
         {name: OmegaConf.to_container(cfg[name], resolve=True) for name in MODEL_SECTIONS}
     )
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
+    metadata = {"format": FORMAT, "config": json.dumps(OmegaConf.to_container(chosen))}
     file.parent.mkdir(parents=True, exist_ok=True)
     aside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
-        save_file(
-            state,
-            str(aside),
-            metadata={"format": FORMAT, "config": json.dumps(OmegaConf.to_container(chosen))},
-        )
+        save_file(state, str(aside), metadata=metadata if note is None else {**metadata, "note": note})
         os.replace(aside, file)
     finally:
         aside.unlink(missing_ok=True)
@@ -223,6 +225,14 @@ def _read_safetensors(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
         raise DataError(
             f"{file}: its metadata holds no readable config ({error}); write it again from its run."
         ) from error
+
+
+def _note_of(file: Path) -> str | None:
+    """What a weights file says about itself; nothing where it says nothing."""
+    if file.suffix != ".safetensors":
+        return None
+    with safe_open(str(file), framework="pt") as opened:
+        return (opened.metadata() or {}).get("note")
 
 
 def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
