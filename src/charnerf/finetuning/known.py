@@ -121,7 +121,7 @@ def _in_chunks(function: Callable[[Tensor, Tensor], Tensor], points: Tensor, dir
 
 def within_memory(placed: PlacedRays, network: CharNeRF, num_views: int, mib: float) -> int:
     """How many of the rays may be kept within a bound, MiB, at the mean number of samples a ray."""
-    row = num_views * (finest(network).from_latents.out_features + 8) * BYTES
+    row = num_views * (finest(network).multi_view.density.in_features + 8) * BYTES
     samples = int(placed.inside.sum()) / max(1, len(placed.inside))
     return max(1, int(mib * 2**20 / (row * max(samples, 1.0))))
 

@@ -1,0 +1,71 @@
+"""Three drawings and weights to a folder of adapted weights: what `charnerf finetune` does."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from tqdm import tqdm
+
+from charnerf.errors import DataError
+from charnerf.finetuning.finetune import CurvePoint, Finetuned, finetune
+from charnerf.finetuning.recipe import Recipe
+from charnerf.finetuning.report import summary_lines, write_finetuned
+from charnerf.model_api import Hero, Model
+
+BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
+
+
+def refine(model: Model, hero: Hero, seconds: float, *, recipe: Recipe | None = None) -> Finetuned:
+    """Fine-tune with a progress bar that shows how the held-out patches fare."""
+    chosen = replace(recipe or Recipe(), seconds=seconds)
+    with tqdm(total=1.0, desc="fine-tune", bar_format=BAR) as bar:
+
+        def progress(share: float, point: CurvePoint) -> None:
+            bar.set_postfix_str(f", held out {point.held_out_psnr:.1f} dB", refresh=False)
+            bar.update(max(0.0, min(share, 0.99) - bar.n))
+
+        done = finetune(model, hero, chosen, on_progress=progress)
+        bar.update(1.0 - bar.n)
+    return done
+
+
+def finetune_drawings(
+    model: Model,
+    *,
+    front: Path,
+    side: Path,
+    back: Path,
+    output: Path,
+    seconds: float,
+    side_is: Literal["left", "right"] = "left",
+    say: Callable[[str], object],
+) -> Finetuned:
+    """Adapt a model to a character's drawings and write the folder.
+
+    Args:
+        model: Starting weights.
+        front: Front drawing.
+        side: Side drawing.
+        back: Back drawing.
+        output: Folder; made if missing.
+        seconds: Time for it.
+        side_is: Which side of the character the side drawing shows.
+        say: Gets what was assumed and what happened, sentence by sentence.
+
+    Raises:
+        DataError: If a drawing can not be used, or the folder can not be written.
+    """
+    if output.exists() and not output.is_dir():
+        raise DataError(f"{output}: found a file, expected a folder to write to. Choose another.")
+    hero = model.encode(front=front, side=side, back=back, side_is=side_is)
+    drawings = hero.turnaround
+    assert drawings is not None  # encode made it
+    for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
+        say(line)
+    done = refine(model, hero, seconds)
+    report = write_finetuned(done, output, recipe=replace(Recipe(), seconds=seconds), drawings=drawings)
+    for line in summary_lines(done):
+        say(line)
+    say(f"{output / 'weights.safetensors'}, {report}")
+    return done

@@ -1,0 +1,70 @@
+"""The folder of a fine-tuning: weights that load, a curve, a report that tells what happened."""
+
+import csv
+from dataclasses import replace
+
+import pytest
+import torch
+
+import charnerf
+from charnerf import runs
+from charnerf.config.composition import compose_config
+from charnerf.finetuning import Recipe, finetune
+from charnerf.finetuning.report import write_finetuned
+from charnerf.model_api import Model
+
+QUICK = Recipe(
+    seconds=60.0,
+    most_steps=10,
+    check_every=5,
+    rays=128,
+    novel_rays=32,
+    learning_rate=3e-3,
+    least_likeness=0.0,
+)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory) -> Model:
+    """An untrained model of scale=smoke, with a config of its own."""
+    torch.manual_seed(0)
+    cfg = compose_config(["scale=smoke"])
+    file = tmp_path_factory.mktemp("smoke") / "weights.safetensors"
+    return charnerf.load(runs.save_weights(file, runs.build_model(cfg), cfg))
+
+
+def test_the_folder_loads_as_the_adapted_model(model, person_views, tmp_path):
+    done = finetune(model, model.encode_views(person_views), QUICK)
+    assert done.kept, done.reason
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    report = write_finetuned(done, tmp_path / "out", recipe=QUICK, drawings=None)
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["config.yaml", "curve.csv", "curve.png", "notes.txt", "report.md", "weights.safetensors"]
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+    again = charnerf.load(tmp_path / "out")
+    assert again.note is not None and "one character" in again.note and model.note is None
+    for name, tensor in again.network.state_dict().items():
+        assert torch.equal(tensor, done.model.network.state_dict()[name])
+    rows = list(csv.DictReader((tmp_path / "out" / "curve.csv").open()))
+    assert [int(row["step"]) for row in rows] == [0, 5, 10]
+    assert float(rows[0]["held_out"]) > done.best.held_out
+    text = report.read_text()
+    for words in (
+        "Kept: the error",
+        "for this one character",
+        "| seconds | step |",
+        "Left out: 10 encoder passes",
+    ):
+        assert words in text
+
+
+def test_what_was_not_kept_is_said_and_loads_too(model, person_views, tmp_path):
+    recipe = replace(QUICK, learning_rate=0.0)
+    done = finetune(model, model.encode_views(person_views), recipe)
+    report = write_finetuned(done, tmp_path / "out", recipe=recipe, drawings=None)
+    assert "Not kept" in report.read_text()
+    again = charnerf.load(tmp_path / "out" / "weights.safetensors")
+    assert again.note is not None and "not kept" in again.note
+    for name, tensor in again.network.state_dict().items():
+        assert torch.equal(tensor, model.network.state_dict()[name])
