@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from charnerf.cli_finetune import finetune
 from charnerf.cli_options import (
     Dataset,
     Depth,
@@ -263,6 +264,9 @@ def reconstruct(
         device=device,
         trust=trust or [],
     )
+
+
+app.command(epilog=DEBUG_NOTE)(finetune)
 
 
 @app.command(epilog=DEBUG_NOTE)
