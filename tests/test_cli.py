@@ -170,6 +170,7 @@ def test_mesh_and_reconstruct_write_their_files(dataset: Path, weights: Path, tm
     assert run(["mesh", str(weights), *where, "--format", "ply", *common]) == 0
     mesh = trimesh.load(tmp_path / "mesh" / "robot.ply")
     assert mesh.bounds[1, 2] - mesh.bounds[0, 2] == pytest.approx(2.0, abs=1e-3)
+    assert (tmp_path / "mesh" / "robot_sheet.png").is_file()
     drawings = [str(dataset / "robot" / "sources" / f"{view}.png") for view in ("front", "side", "back")]
     out = tmp_path / "hero"
     more = ["--weights", str(weights), "--frames", "2", "--size", "32", "--faces", "500", *common]
@@ -177,6 +178,24 @@ def test_mesh_and_reconstruct_write_their_files(dataset: Path, weights: Path, tm
     assert (out / "mesh.glb").is_file()
     assert (out / "report.md").is_file()
     assert (out / "turntable.mp4").is_file() or (out / "turntable.gif").is_file()
+
+
+def test_levels_of_detail_come_in_one_call_with_one_table(
+    dataset: Path, weights: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = ["mesh", str(weights), "--data", str(dataset), "--character", "robot", "-o", str(tmp_path / "x")]
+    levels = ["--lod", "16,24", "--faces", "100,200", "--texture", "drawings", "--texture-size", "64"]
+    assert run([*where, *levels, "--format", "obj", "--height", "1.5", "--device", "cpu"]) == 0
+    table = capsys.readouterr().out
+    assert (tmp_path / "x" / "lods.md").read_text().count(table) == 1
+    rows = json.loads((tmp_path / "x" / "lods.json").read_text())
+    assert len(rows) == 4 and all(f"| {row['file']} |" in table for row in rows)
+    for row in rows:
+        file = tmp_path / "x" / f"{row['file']}.obj"
+        assert file.with_suffix(".mtl").is_file() and file.with_suffix(".png").is_file()
+        assert trimesh.load(file, force="mesh").extents[1] == pytest.approx(1.5, abs=1e-5)
+    assert run([*where, "--lod", "16,many"]) == 2
+    assert run([*where, "--faces", "3"]) == 2
 
 
 def test_python_m_charnerf_is_the_command() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, final
@@ -14,6 +14,7 @@ from charnerf.drawings.turnaround import Turnaround, read_turnaround
 from charnerf.errors import ConfigError, ShapeError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing.build import BuiltMesh, build_mesh
+from charnerf.meshing.lod import Lod, build_lods
 from charnerf.meshing.texture import TEXTURE_SIZE, Texturing
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import Cameras, Scene, SourceViews
@@ -196,6 +197,46 @@ class Hero:
                 faces=faces,
                 height=height,
                 texturing=self.texturing(texture, texture_size),
+                on_points=on_points,
+            )
+
+    def lods(
+        self,
+        *,
+        resolutions: Sequence[int],
+        faces: Sequence[int] = (),
+        num_cameras: int = 8,
+        height: float = HEIGHT,
+        texture: TextureKind = "vertex",
+        texture_size: int = TEXTURE_SIZE,
+        decimated_only: bool = False,
+        on_points: Callable[[int], object] = lambda count: None,
+    ) -> tuple[Lod, ...]:
+        """Make levels of detail, the finest first: one mesh a grid, and one a number of faces.
+
+        Args:
+            resolutions: Grids, points along the longest side.
+            faces: Faces to decimate the finest grid's surface to.
+            num_cameras: As of `mesh`, as are the next three.
+            height: Exact height of each, m.
+            texture: Their colours.
+            texture_size: Texels a side.
+            decimated_only: Leave the grids' own meshes out.
+            on_points: Called with the number of grid points after each piece of work.
+
+        Returns:
+            Levels; `charnerf.meshing.lod.lod_table` makes a table of them.
+        """
+        with torch.no_grad():
+            return build_lods(
+                self.scene,
+                self.views,
+                resolutions=resolutions,
+                faces=faces,
+                num_cameras=num_cameras,
+                height=height,
+                texturing=self.texturing(texture, texture_size),
+                decimated_only=decimated_only,
                 on_points=on_points,
             )
 

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw
 from charnerf.drawings.turnaround import read_turnaround
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.hull import build_hull
+from charnerf.meshing.parts import read_texture
 from charnerf.model_api import Hero
 from charnerf.reconstruction import reconstruct
 from charnerf.types import FieldOutput, Scene
@@ -66,13 +67,14 @@ def drawings(tmp_path) -> dict[str, Path]:
     return paths
 
 
-OPTIONS = {"resolution": 32, "faces": 600, "frames": 6, "size": 48, "num_cameras": 2}
+OPTIONS = {"resolution": 32, "faces": 600, "frames": 6, "size": 48, "num_cameras": 2, "texture_size": 128}
 
 
 def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
     done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["drawings.png", "mesh.glb", "report.md", done.turntable.name, "views"]
+    assert names == ["drawings.png", "mesh.glb", "meshes", "report.md", done.turntable.name, "views"]
+    assert Image.open(tmp_path / "out" / "meshes" / "mesh_sheet.png").width > 1000
     assert sorted(v.name for v in done.views) == [f"{60 * k:03d}.png" for k in range(6)]
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
     np.testing.assert_allclose(mesh.bounds[:, 1], (0.0, 2.0), atol=1e-6)  # Y up
@@ -83,6 +85,19 @@ def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
     assert front[0] > 200 and front[1] < 60 and front[3] > 240
     assert back[1] > 180 and back[0] < 60
     assert iio.imread(done.turntable).shape == (6, 48, 48, 3)
+
+
+def test_the_mesh_wears_the_drawings(tmp_path, drawings):
+    """The field is red in front and green behind; the side drawing is orange, which the field never is."""
+    done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
+    mesh = trimesh.load(done.mesh, force="mesh", process=False)
+    uv = np.asarray(mesh.visual.uv)
+    colours = read_texture(mesh.visual.material.baseColorTexture, uv)
+    left = mesh.vertices[:, 0] > 0.45  # Y up: x stays the character's left
+    assert left.any()
+    np.testing.assert_allclose(np.median(colours[left], axis=0), (1.0, 165 / 255, 0.0), atol=0.02)
+    plain = reconstruct(FakeModel(), **drawings, output=tmp_path / "plain", **OPTIONS, texture="vertex")
+    assert trimesh.load(plain.mesh, force="mesh").visual.material.baseColorTexture is None
 
 
 def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):

@@ -48,11 +48,13 @@ class Textured:
 
     Attributes:
         mesh: The same surface, its vertices split at seams, normals those of the surface before.
+        size: S.
         num_texels: K.
         num_from_field: Texels for which the field was asked; the others were left out.
     """
 
     mesh: trimesh.Trimesh
+    size: int
     num_texels: int
     num_from_field: int
 
@@ -78,7 +80,7 @@ def texture_mesh(scene: Scene, mesh: trimesh.Trimesh, texturing: Texturing) -> T
     else:
         rgb, asked = _drawn_colours(scene, mesh, texturing.views, points, normals, texels)
     picture = Image.fromarray(padded_picture(rgb, texels, texturing.size))
-    return Textured(textured_copy(mesh, atlas, picture), len(points), asked)
+    return Textured(textured_copy(mesh, atlas, picture), texturing.size, len(points), asked)
 
 
 def _spread(values: np.ndarray, mesh: trimesh.Trimesh, texels: Texels) -> np.ndarray:

@@ -4,7 +4,6 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -16,14 +15,14 @@ from tqdm import tqdm
 from charnerf.errors import DataError
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
-from charnerf.model_api import Model
+from charnerf.meshing.sheet import contact_sheet
+from charnerf.model_api import HEIGHT, TEXTURE_SIZE, Model, TextureKind
+from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import report_text
 from charnerf.reconstruction.turntable import on_white, render_around, write_film
 
 MOST_VIEWS = 12
 MESH_STEPS = 12  # of the progress bar, beside one a frame: what a mesh takes, about
-MESH_POINTS = 0.06  # of the grid: evaluated in the usual case; only the progress bar depends on it
-BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}, about {remaining} left"
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,9 @@ def reconstruct(
     frames: int = 36,
     size: int = 160,
     num_cameras: int = 8,
+    height: float = HEIGHT,
+    texture: TextureKind = "drawings",
+    texture_size: int = TEXTURE_SIZE,
 ) -> Reconstruction:
     """Reconstruct a character from three drawings into a folder.
 
@@ -80,6 +82,9 @@ def reconstruct(
         frames: Frames of the turntable.
         size: Side of pictures, pixels; 36 of 160 take half a minute on two cores.
         num_cameras: Cameras whose directions the density is averaged over.
+        height: Of the mesh, m.
+        texture: Where the mesh's colours come from: drawings, field or vertex.
+        texture_size: Texels a side.
 
     Raises:
         DataError: If a drawing can not be used, or the folder can not be written.
@@ -98,7 +103,13 @@ def reconstruct(
         pictures = render_around(hero, frames, size, on_frame=bar.update)
         rendered = time.perf_counter()
         built = hero.build_mesh(
-            resolution=resolution, num_cameras=num_cameras, faces=faces, on_points=_meter(bar, resolution)
+            resolution=resolution,
+            num_cameras=num_cameras,
+            faces=faces,
+            height=height,
+            texture=texture,
+            texture_size=texture_size,
+            on_points=meter(bar, (resolution,), MESH_STEPS),
         )
         bar.update((bar.total or 0) - bar.n)
     seconds = {
@@ -110,6 +121,8 @@ def reconstruct(
     aside = Path(tempfile.mkdtemp(dir=output.parent, prefix=f".{output.name}."))
     try:
         save_mesh(built.mesh, aside / "mesh.glb")
+        (aside / "meshes").mkdir()
+        contact_sheet(built.mesh, drawings.detailed).save(aside / "meshes" / "mesh_sheet.png")
         film, film_note = write_film([on_white(picture) for picture in pictures], aside)
         views = _write_views(pictures, aside / "views")
         Image.fromarray(drawings.picture).save(aside / "drawings.png")
@@ -135,16 +148,6 @@ def reconstruct(
         warnings=drawings.warnings,
         seconds=seconds,
     )
-
-
-def _meter(bar: tqdm, resolution: int) -> Callable[[int], None]:
-    """Turn numbers of evaluated points into steps of the bar, which stops short of its end."""
-    per_point = MESH_STEPS / (MESH_POINTS * resolution**3)
-
-    def step(count: int) -> None:
-        bar.update(max(0.0, min(count * per_point, (bar.total or 0) - 0.5 - bar.n)))
-
-    return step
 
 
 def _write_views(pictures: list[np.ndarray], folder: Path) -> list[Path]:

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import trimesh
-
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.meshing.build import BuiltMesh
 
@@ -38,8 +36,11 @@ def report_text(
     lines += [f"- {one}" for one in drawings.assumptions]
     lines += [f"- **warning**: {one}" for one in drawings.warnings]
     lines += ["", "## Files", ""]
-    lines += [f"- [mesh.glb](mesh.glb): {_mesh_words(built.mesh)}; vertex colours, metres, Y up, facing +Z"]
+    lines += [f"- [mesh.glb](mesh.glb): {mesh_words(built)}; metres, Y up, facing +Z"]
     lines += [f"- [{film.name}]({film.name}){': ' + film_note if film_note else ''}"]
+    lines += [
+        "- [meshes/mesh_sheet.png](meshes/mesh_sheet.png): the mesh from all sides, beside the drawings"
+    ]
     lines += ["- [views](views): pictures with alpha, named by azimuth in degrees", ""]
     lines += _mesh_lines(built)
     lines += ["", "## Seconds", "", "| stage | seconds |", "|---|---|"]
@@ -52,26 +53,40 @@ def _picture(view: Path) -> str:
     return f"![{view.stem} degrees]({view.parent.name}/{view.name})"
 
 
-def _mesh_words(mesh: trimesh.Trimesh) -> str:
-    width, depth, height = mesh.extents
-    closed = "closed" if mesh.is_watertight else "not closed"
+def mesh_words(built: BuiltMesh) -> str:
+    """Counts and size of a mesh."""
+    surface = built.surface
+    width, depth, height = surface.extents
+    closed = "closed" if surface.is_watertight else "not closed"
     size = f"{width:.2f} x {depth:.2f} x {height:.2f} m"
-    return f"{len(mesh.vertices)} vertices, {len(mesh.faces)} faces, {closed}, {size}"
+    counts = f"{len(surface.vertices)} vertices, {len(surface.faces)} faces, {closed}, {size}"
+    if built.textured is None:
+        return f"{counts}; vertex colours"
+    return f"{counts}; a texture of {built.textured.size} x {built.textured.size}"
+
+
+def mesh_sentences(built: BuiltMesh) -> list[str]:
+    """How a mesh came about."""
+    share = built.left_out.shares()["grid_cells"] or 0.0
+    lines = [
+        f"Surface where the density is {built.level:.3g} per metre; Euler number "
+        f"{built.surface.euler_number}.",
+        f"{100 * share:.1f} % of the grid's points were left out: outside the hull or away from the surface.",
+        f"{built.num_floaters} loose parts and {built.num_cavities} hidden cavities were dropped.",
+        f"{built.num_extracted} faces before decimation.",
+    ]
+    if built.textured is not None:
+        asked = built.textured.num_from_field / max(built.textured.num_texels, 1)
+        lines.append(
+            f"Texture: {100 - 100 * asked:.1f} % of {built.textured.num_texels} texels from the drawings alone, the field"
+            f" was asked for {100 * asked:.1f} %."
+        )
+    return lines
 
 
 def _mesh_lines(built: BuiltMesh) -> list[str]:
-    """How the mesh came about."""
-    share = built.left_out.shares()["grid_cells"] or 0.0
-    lines = [
-        "## Mesh",
-        "",
-        f"- Surface where the density is {built.level:.3g} per metre; Euler number "
-        f"{built.mesh.euler_number}.",
-        f"- {100 * share:.1f} % of the grid's points were left out: outside the hull or away from the "
-        f"surface.",
-        f"- {built.num_floaters} loose parts and {built.num_cavities} hidden cavities were dropped.",
-        f"- {built.num_extracted} faces before decimation.",
-    ]
+    """How the mesh came about, and the evidence for its level."""
+    lines = ["## Mesh", "", *(f"- {one}" for one in mesh_sentences(built))]
     if built.choice is None:
         return [*lines, "- The density was given, not chosen."]
     lines += ["", "The density was chosen so that the surface lies where rendering, seen from around, loses"]

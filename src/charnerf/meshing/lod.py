@@ -1,0 +1,168 @@
+"""Levels of detail: meshes of one character by grid and by number of faces, and the table of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from charnerf.errors import DataError
+from charnerf.meshing.build import BuiltMesh, find_surface, finish_mesh
+from charnerf.meshing.distance import surface_chamfer_mm
+from charnerf.meshing.texture import Texturing
+from charnerf.types import Scene, SourceViews
+
+PAPER = {64: (1822, 3640), 128: (7646, 15288), 256: (49582, 98972)}
+"""Vertices and polygons of the paper's Table I by grid."""
+
+
+@dataclass(frozen=True)
+class Lod:
+    """One level of detail.
+
+    Attributes:
+        resolution: Grid points along the longest side.
+        asked: Faces asked for; None where none were decimated.
+        built: The mesh.
+        chamfer_mm: Distance of its surface from the finest level's, mm.
+        seconds: Time it took, from what was there before: the field for grids, the finest grid's surface for
+            decimated meshes.
+    """
+
+    resolution: int
+    asked: int | None
+    built: BuiltMesh
+    chamfer_mm: float
+    seconds: float
+
+    def row(self) -> dict[str, Any]:
+        """The figures of the table."""
+        surface = self.built.surface
+        counts = self.built.left_out
+        evaluated = 1.0 - counts.grid_cells / max(counts.grid_cells_of, 1)
+        return {
+            "grid": self.resolution,
+            "faces_asked": self.asked,
+            "vertices": len(surface.vertices),
+            "faces": len(surface.faces),
+            "parts": num_parts(surface),
+            "watertight": bool(surface.is_watertight),
+            "euler_number": int(surface.euler_number),
+            "chamfer_mm": self.chamfer_mm,
+            "evaluated": evaluated if self.asked is None else None,
+            "seconds": self.seconds,
+        }
+
+
+def build_lods(
+    scene: Scene,
+    views: SourceViews | None,
+    *,
+    resolutions: Sequence[int],
+    faces: Sequence[int] = (),
+    num_cameras: int = 8,
+    height: float | None = None,
+    texturing: Texturing | None = None,
+    decimated_only: bool = False,
+    on_points: Callable[[int], object] = lambda count: None,
+) -> tuple[Lod, ...]:
+    """Make meshes of one field at several levels of detail, all of one density level.
+
+    Args:
+        scene: One character's field.
+        views: Its drawings (B = 1).
+        resolutions: Grids, points along the longest side; at least one.
+        faces: Faces to decimate the finest grid's surface to.
+        num_cameras: Cameras whose directions the density is averaged over.
+        height: Height to scale each to, m; None leaves size and place as the field has them.
+        texturing: How to texture each; None gives vertex colours.
+        decimated_only: Leave the grids' own meshes out.
+        on_points: Called with the number of grid points after each piece of work.
+
+    Returns:
+        The levels, most faces first; distances are to the first.
+
+    Raises:
+        DataError: If an argument is out of range, there is no grid, or the hull is empty.
+        NumericalError: If the field is empty or not finite.
+    """
+    if not resolutions:
+        raise DataError("lod: found no grid, expected at least one, such as 128.")
+    made: list[tuple[int, int | None, BuiltMesh, float]] = []
+    level, finest = None, None
+    for resolution in sorted(set(resolutions), reverse=True):
+        start = time.perf_counter()
+        found = find_surface(
+            scene, views, resolution=resolution, num_cameras=num_cameras, level=level, on_points=on_points
+        )
+        level, finest = found.extraction.level, finest or found
+        if not decimated_only:
+            built = finish_mesh(scene, found, height=height, texturing=texturing)
+            made.append((resolution, None, built, time.perf_counter() - start))
+    assert finest is not None
+    for count in sorted(set(faces), reverse=True):
+        start = time.perf_counter()
+        built = finish_mesh(scene, finest, faces=count, height=height, texturing=texturing)
+        made.append((max(resolutions), count, built, time.perf_counter() - start))
+    made.sort(key=lambda one: len(one[2].surface.faces), reverse=True)
+    first = made[0][2].surface
+    return tuple(
+        Lod(resolution, asked, built, _distance(built.surface, first), seconds)
+        for resolution, asked, built, seconds in made
+    )
+
+
+def _distance(mesh: trimesh.Trimesh, finest: trimesh.Trimesh) -> float:
+    return 0.0 if mesh is finest else surface_chamfer_mm(mesh, finest)
+
+
+def named(lods: Sequence[Lod], name: str) -> dict[str, Lod]:
+    """Levels by file name without suffix, as engines pair them: NAME_LOD0 is the finest."""
+    return {f"{name}_LOD{index}": lod for index, lod in enumerate(lods)}
+
+
+def lod_table(files: dict[str, Lod]) -> str:
+    """The table of levels as Markdown, the paper's values beside those grids that it has."""
+    heads = ("file", "grid", "vertices", "faces", "parts", "watertight", "Euler number", "Chamfer, mm")
+    lines = ["| " + " | ".join((*heads, "evaluated", "s", "paper: vertices, faces, Euler number")) + " |"]
+    lines.append("|---" * (len(heads) + 3) + "|")
+    for file, lod in files.items():
+        row = lod.row()
+        cells = [file, f"{row['grid']}", f"{row['vertices']}", f"{row['faces']}", f"{row['parts']}"]
+        cells += ["yes" if row["watertight"] else "no", f"{row['euler_number']}", f"{row['chamfer_mm']:.2f}"]
+        share = row["evaluated"]
+        cells += ["-" if share is None else f"{100 * share:.1f} %", f"{row['seconds']:.1f}"]
+        paper = PAPER.get(lod.resolution) if lod.asked is None else None
+        cells.append("-" if paper is None else f"{paper[0]}, {paper[1]}, {paper[0] - paper[1] // 2}")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def lod_report(files: dict[str, Lod]) -> str:
+    """The text of lods.md."""
+    return "\n".join(
+        (
+            "# Levels of detail",
+            "",
+            lod_table(files),
+            "",
+            "Chamfer: mean distance of the surface from the finest grid's and back. Evaluated: grid points of",
+            "all that the field was asked for. Paper: Table I of CharNeRF, one character of its own; the Euler",
+            "number is what its counts give for a closed surface (2 for one without holes or floaters).",
+            "",
+        )
+    )
+
+
+def num_parts(mesh: trimesh.Trimesh) -> int:
+    """Connected parts of a mesh."""
+    edges = np.asarray(mesh.edges)
+    links = coo_array((np.ones(len(edges), bool), edges.T), shape=(len(mesh.vertices),) * 2)
+    _, label = connected_components(links, directed=False)
+    return len(np.unique(label[np.asarray(mesh.faces)[:, 0]]))
