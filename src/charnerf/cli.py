@@ -11,11 +11,11 @@ from typing import Annotated, Literal
 import typer
 
 from charnerf.cli_finetune import finetune
+from charnerf import cli_meshes
 from charnerf.cli_options import (
     Dataset,
     Depth,
     Device,
-    Folder,
     Jobs,
     NewDataset,
     Size,
@@ -23,7 +23,6 @@ from charnerf.cli_options import (
     Trusted,
     Views,
     Weights,
-    WeightsOption,
 )
 from charnerf.errors import CharNeRFError, ConfigError
 
@@ -178,95 +177,8 @@ def evaluate(
     )
 
 
-@app.command(epilog=DEBUG_NOTE)
-def mesh(
-    *,
-    data: Dataset,
-    character: Annotated[str, typer.Option(metavar="NAME", help="Character of the data set.")],
-    output: Folder,
-    weights: Weights = None,
-    resolution: Annotated[
-        int, typer.Option(min=16, max=1024, help="Grid points along the longest side.")
-    ] = 128,
-    cameras: Annotated[
-        int, typer.Option(min=1, help="Cameras whose directions the density is averaged over.")
-    ] = 8,
-    faces: Annotated[int | None, typer.Option(min=4, help="Faces after decimation; all if left out.")] = None,
-    format_: Annotated[
-        Literal["glb", "gltf", "obj", "ply", "stl"], typer.Option("--format", help="File format of the mesh.")
-    ] = "glb",
-    device: Device = "auto",
-    trust: Trusted = None,
-) -> None:
-    """Make the mesh of one character of a data set: DIR/NAME.glb, vertex colours, metres."""
-    from charnerf import commands
-
-    commands.mesh(
-        weights,
-        data,
-        character,
-        output,
-        resolution=resolution,
-        cameras=cameras,
-        faces=faces,
-        suffix=format_,
-        device=device,
-        trust=trust or [],
-    )
-
-
-@app.command(epilog=DEBUG_NOTE)
-def reconstruct(
-    front: Annotated[
-        Path, typer.Argument(metavar="FRONT", exists=True, dir_okay=False, help="Front view, an image.")
-    ],
-    side: Annotated[Path, typer.Argument(metavar="SIDE", exists=True, dir_okay=False, help="Side view.")],
-    back: Annotated[Path, typer.Argument(metavar="BACK", exists=True, dir_okay=False, help="Back view.")],
-    *,
-    output: Folder,
-    weights: WeightsOption = None,
-    side_shows: Annotated[
-        Literal["left", "right"],
-        typer.Option(
-            "--side",
-            help="Which side of the character SIDE shows; left: its face looks to the picture's left.",
-        ),
-    ] = "left",
-    resolution: Annotated[
-        int, typer.Option(min=16, max=1024, help="Grid points along the mesh's longest side.")
-    ] = 128,
-    faces: Annotated[int, typer.Option(min=4, help="Faces of the mesh after decimation.")] = 8000,
-    frames: Annotated[int, typer.Option(min=1, help="Frames of the turntable.")] = 36,
-    size: Size = 192,
-    cameras: Annotated[
-        int, typer.Option(min=1, help="Cameras whose directions the density is averaged over.")
-    ] = 8,
-    device: Device = "auto",
-    trust: Trusted = None,
-) -> None:
-    """Turn three drawings into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.md.
-
-    The images have alpha or a plain background, any sizes and crops: figures are cut out and brought to one
-    height and floor line. What was assumed is printed, and drawn in the report.
-    """
-    from charnerf import commands
-
-    commands.reconstruct(
-        (front, side, back),
-        output,
-        weights=weights,
-        side_is=side_shows,
-        resolution=resolution,
-        faces=faces,
-        frames=frames,
-        size=size,
-        cameras=cameras,
-        device=device,
-        trust=trust or [],
-    )
-
-
-app.command(epilog=DEBUG_NOTE)(finetune)
+app.command(epilog=DEBUG_NOTE)(cli_meshes.mesh)
+app.command(epilog=DEBUG_NOTE)(cli_meshes.reconstruct)
 
 
 @app.command(epilog=DEBUG_NOTE)

@@ -21,9 +21,10 @@ from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
 from charnerf.meshing.build import build_mesh
-from charnerf.meshing.export import save_mesh
-from charnerf.model_api import Model
+from charnerf.meshing.lod import lod_table
+from charnerf.model_api import Model, TextureKind
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
+from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.reporting.folder_report import write_folder_report
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
@@ -171,20 +172,18 @@ def mesh(
     character: str,
     output: Path,
     *,
-    resolution: int,
-    cameras: int,
-    faces: int | None,
-    suffix: str,
+    request: MeshRequest,
     device: str,
     trust: Sequence[str],
 ) -> None:
-    """Write the mesh of one character of a data set."""
+    """Write the mesh of one character of a data set, or its levels of detail; print their table."""
     model = load_model(weights, device=device, trust=trust)
     hero = model.encode_views(load_character(data, character).sources)
-    built = hero.build_mesh(resolution=resolution, num_cameras=cameras, faces=faces)
-    output.mkdir(parents=True, exist_ok=True)
-    path = save_mesh(built.mesh, output / f"{character}.{suffix}")
-    say(f"{path}: {len(built.mesh.faces)} faces, level {built.level:.1f} 1/m, {built.seconds:.1f} s.")
+    done = write_meshes(hero, character, output, request)
+    for line in done.said:
+        say(line)
+    if done.lods:
+        sys.stdout.write(lod_table(done.lods) + "\n")
 
 
 def reconstruct(
@@ -198,6 +197,9 @@ def reconstruct(
     frames: int,
     size: int,
     cameras: int,
+    height: float,
+    texture: TextureKind,
+    texture_size: int,
     device: str,
     trust: Sequence[str],
 ) -> None:
@@ -215,28 +217,11 @@ def reconstruct(
         frames=frames,
         size=size,
         num_cameras=cameras,
+        height=height,
+        texture=texture,
+        texture_size=texture_size,
     )
     say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")
-
-
-def finetune(
-    drawings: tuple[Path, Path, Path],
-    output: Path,
-    *,
-    weights: Path | None,
-    seconds: float,
-    side_is: Literal["left", "right"],
-    device: str,
-    trust: Sequence[str],
-) -> None:
-    """Adapt weights to a character's drawings, and tell what was assumed and whether it helped."""
-    from charnerf.finetuning.command import finetune_drawings
-
-    front, side, back = drawings
-    model = load_model(weights, device=device, trust=trust)
-    finetune_drawings(
-        model, front=front, side=side, back=back, output=output, seconds=seconds, side_is=side_is, say=say
-    )
 
 
 def report(folder: Path) -> None:
