@@ -58,11 +58,11 @@ def photograph(mesh: trimesh.Trimesh, camera: Cameras, *, oversampling: int = 4)
     return (mean * 255.0).round().to(torch.uint8)
 
 
-def source_cameras(*, size: int = SIZE) -> Cameras:
+def source_cameras(*, size: int = SIZE, half_extent: float = 1.1) -> Cameras:
     """Front, side, back, orthographic, (3,)."""
     directions = direction_from_angles(torch.tensor([0.0, 90.0, 180.0]), torch.zeros(3))
     return cameras_towards(
-        directions, target=CENTRE, distance=4.0, half_extent=1.1, size=size, orthographic=True
+        directions, target=CENTRE, distance=4.0, half_extent=half_extent, size=size, orthographic=True
     )
 
 
@@ -82,10 +82,13 @@ def source_views(mesh: trimesh.Trimesh, *, size: int = SIZE) -> SourceViews:
     return SourceViews(images.movedim(-1, 1)[None], cameras[None], flags, ~flags)
 
 
-def write_figure(root: Path, name: str, kind: str, *, num_views: int, size: int = SIZE) -> None:
+def write_figure(
+    root: Path, name: str, kind: str, *, num_views: int, size: int = SIZE, half_extent: float = 1.1
+) -> None:
     """Add a figure to the test split of a data set."""
     mesh = figure(kind)
-    cameras, sources = target_cameras(num_views, size=size), source_cameras(size=size)
+    cameras = target_cameras(num_views, size=size)
+    sources = source_cameras(size=size, half_extent=half_extent)
     pictures = CharacterPictures(
         cameras=cameras,
         images=torch.stack([photograph(mesh, cameras[index]) for index in range(num_views)]).numpy(),

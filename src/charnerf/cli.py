@@ -17,6 +17,7 @@ from charnerf.cli_options import (
     Depth,
     Device,
     Jobs,
+    NearestFrom,
     NewDataset,
     Size,
     Sources,
@@ -151,8 +152,9 @@ def evaluate(
         int, typer.Option(min=16, max=1024, help="Grid points along a mesh's longest side.")
     ] = 128,
     baselines: Annotated[
-        bool, typer.Option(help="Measure white and the visual hull beside the model.")
+        bool, typer.Option(help="Measure white, the visual hull and the nearest beside the model.")
     ] = True,
+    nearest_from: NearestFrom = None,
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -172,6 +174,7 @@ def evaluate(
         renderer=renderer,
         resolution=resolution if mesh else None,
         baselines=baselines,
+        nearest_from=nearest_from or [],
         device=device,
         trust=trust or [],
     )

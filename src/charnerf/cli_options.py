@@ -26,6 +26,15 @@ Dataset = Annotated[
     Path,
     typer.Option("--data", metavar="DATASET", exists=True, file_okay=False, help="Folder with dataset.json."),
 ]
+NearestFrom = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--nearest-from",
+        metavar="DATASET[:SPLIT]",
+        help="Characters that the model was trained on, for the baseline `nearest`; split train if left out; may be"
+        " given several times.",
+    ),
+]
 Folder = Annotated[
     Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="Folder to write to.")
 ]

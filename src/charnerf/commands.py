@@ -16,10 +16,12 @@ from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.lights import Headlight, Unlit
 from charnerf.data.characters import load_character
+from charnerf.data.digest import split_digest
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
+from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.lod import lod_table
 from charnerf.model_api import Model, TextureKind
@@ -97,6 +99,8 @@ def capture(
     options = CaptureOptions(views=views, size=size, sources=sources, depth=depth, light=LIGHTS[light]())  # type: ignore[arg-type]
     done = capture_dataset(meshes, output, split, options=options, up=up, facing=facing, processes=jobs)
     say(f"{len(done.captured)} characters captured into {output}, split {split}.")
+    if done.captured:
+        say(f"{split}: digest {split_digest(output, split)}")
     if done.failed:
         raise DataError(f"{len(done.failed)} meshes could not be captured:\n  " + "\n  ".join(done.failed))
 
@@ -111,6 +115,9 @@ def generate(
         raise ConfigError("--train, --val, --test: found 0 each, expected at least one character.")
     generate_dataset(output, train, val, test, seed, views=views, size=size, processes=jobs)
     say(f"{train + val + test} characters are in {output}.")
+    for split, members in read_dataset(output).splits.items():
+        if members:
+            say(f"{split}: {len(members)} characters, digest {split_digest(output, split)}")
 
 
 def evaluate(
@@ -124,6 +131,7 @@ def evaluate(
     renderer: str | None,
     resolution: int | None,
     baselines: bool,
+    nearest_from: Sequence[str],
     device: str,
     trust: Sequence[str],
 ) -> None:
@@ -145,6 +153,7 @@ def evaluate(
         mesh=None if resolution is None else partial(build_mesh, resolution=resolution),
         device=model.device,
         baselines=baselines,
+        nearest=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=train_seconds(model.source),
     )
     if output is not None:
@@ -154,6 +163,12 @@ def evaluate(
         json_file.parent.mkdir(parents=True, exist_ok=True)
         write_metrics(json_file, metrics)
     sys.stdout.write(json.dumps(metrics, indent=2) + "\n")
+
+
+def split_of(text: str) -> tuple[Path, str]:
+    """Folder and split of DATASET[:SPLIT]."""
+    folder, _, split = text.rpartition(":")
+    return (Path(text), "train") if not folder or Path(text).is_dir() else (Path(folder), split)
 
 
 def train_seconds(weights: Path) -> float | None:

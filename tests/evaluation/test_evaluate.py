@@ -45,7 +45,7 @@ def test_every_key_of_the_format_is_there_and_every_null_has_its_reason(outcome)
     found, _ = outcome
     assert (found["split"], found["num_characters"], found["num_views"]) == ("test", 2, 8)
     assert list(found["per_character"]) == ["ball", "doll"]
-    assert list(found["baselines"]) == ["white", "visual_hull"]
+    assert list(found["baselines"]) == ["white", "visual_hull", "nearest"]
     for scores in (found, *found["per_character"].values(), *found["baselines"].values()):
         for key in METRIC_KEYS:
             assert (scores[key] is None) == (f"{key}_reason" in scores)

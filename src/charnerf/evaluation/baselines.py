@@ -1,8 +1,7 @@
 """What a user has without any learning: a white sheet, and the carved and coloured silhouettes.
 
 `VisualHullBaseline` carves on a grid whose values are the signed distance to the nearest mask edge, so that
-its marching cubes are smooth, renders by Embree with 2x2 rays a pixel, and colours every hit from the
-source view nearest to the target camera that sees the point. Letters: N views, R rays, K hits.
+its marching cubes are smooth, and colours the surface from the drawings (evaluation/projected.py).
 """
 
 from typing import final
@@ -14,9 +13,8 @@ from scipy.ndimage import distance_transform_edt
 from skimage.measure import marching_cubes
 from torch import Tensor
 
-from charnerf.evaluation.ray_mesh import RayMesh
-from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
-from charnerf.geometry.safe import safe_normalize
+from charnerf.evaluation.projected import FAR, ProjectedMesh, look_up
+from charnerf.geometry.cameras import project
 from charnerf.types import Cameras, RenderOutput, SourceViews
 
 _BOX_CENTRE = (0.0, 0.0, 1.0)
@@ -24,12 +22,6 @@ _BOX_HALF_EXTENT = 1.8
 _COARSE_CELL = 0.06
 _FINE_CELL = 0.012
 _MAX_CELLS = 3_000_000
-_OVERSAMPLING = 2
-_FAR = 10.0
-_MIN_FACING = 0.15
-"""Cosine below which a view grazes the surface: its colours would be the streaks of the silhouette's edge."""
-_RAY_OFFSET = 0.015
-"""How far a shadow ray starts off the surface, m: about one grid cell."""
 
 
 def white_prediction(camera: Cameras) -> RenderOutput:
@@ -39,8 +31,14 @@ def white_prediction(camera: Cameras) -> RenderOutput:
     return RenderOutput(
         rgb=torch.ones(*shape, 3, device=device),
         opacity=torch.zeros(*shape, device=device),
-        depth=torch.full(shape, _FAR, device=device),
+        depth=torch.full(shape, FAR, device=device),
     )
+
+
+def used_drawings(sources: SourceViews) -> tuple[Cameras, Tensor]:
+    """Cameras (V,) and images (V, 4, H, W) of the views that are there and not mirrored, B = 1, on the CPU."""
+    used = (sources.present & ~sources.mirrored)[0]
+    return sources.cameras[0][used].to("cpu", torch.float32), sources.images[0][used].to("cpu", torch.float32)
 
 
 def signed_edge_distances(alphas: Tensor) -> Tensor:
@@ -58,16 +56,6 @@ def signed_edge_distances(alphas: Tensor) -> Tensor:
     return torch.from_numpy(np.stack(distances)).float().reshape(alphas.shape)
 
 
-def _look_up(maps: Tensor, pixels: Tensor) -> Tensor:
-    """Bilinear values (P, C) of maps (C, H, W) at pixels (P, 2); the edge's value outside."""
-    height, width = maps.shape[-2:]
-    grid = 2.0 * pixels / pixels.new_tensor((width, height)) - 1.0
-    values = torch.nn.functional.grid_sample(
-        maps[None], grid[None, None], mode="bilinear", padding_mode="border", align_corners=False
-    )
-    return values[0, :, 0].T
-
-
 def hull_field(cameras: Cameras, edge_distances: Tensor, points: Tensor) -> Tensor:
     """Smooth field (P,), m, whose zero is the visual hull: the smallest signed distance to a mask's edge.
 
@@ -81,7 +69,7 @@ def hull_field(cameras: Cameras, edge_distances: Tensor, points: Tensor) -> Tens
     for view in range(len(edge_distances)):
         pixels, depth, in_front = project(cameras[view], points)
         outside = (pixels - torch.minimum(pixels.clamp_min(0.0), size)).norm(dim=-1)
-        signed = _look_up(edge_distances[view][None], pixels)[:, 0]
+        signed = look_up(edge_distances[view][None], pixels)[:, 0]
         signed = torch.where(outside > 0.0, torch.minimum(signed, -outside), signed)
         pixel = 1.0 / cameras.focal[view].mean()
         if not bool(cameras.orthographic[view]):
@@ -126,67 +114,12 @@ class VisualHullBaseline:
     """
 
     def __init__(self, sources: SourceViews) -> None:
-        used = (sources.present & ~sources.mirrored)[0]
-        self._cameras: Cameras = sources.cameras[0][used].to("cpu", torch.float32)
-        images = sources.images[0][used].to("cpu", torch.float32)
-        self._premultiplied = torch.cat((images[:, :3] * images[:, 3:], images[:, 3:]), dim=1)  # (V, 4, H, W)
-        self.mesh = carve(self._cameras, signed_edge_distances(images[:, 3]))
+        cameras, images = used_drawings(sources)
+        premultiplied = torch.cat((images[:, :3] * images[:, 3:], images[:, 3:]), dim=1)
+        self.mesh = carve(cameras, signed_edge_distances(images[:, 3]))
         if self.mesh is not None:
-            self._rays = RayMesh(self.mesh.vertices, self.mesh.faces)
-            self._normals = np.asarray(self.mesh.face_normals, dtype=np.float32)
+            self._projected = ProjectedMesh(self.mesh.triangles, cameras, premultiplied)
 
     def render(self, camera: Cameras) -> RenderOutput:
         """Picture of a camera of shape (): fields (H, W), on white."""
-        if self.mesh is None:
-            return white_prediction(camera)
-        width, height, many = camera.width, camera.height, _OVERSAMPLING
-        rays = pixel_rays(camera.to("cpu", torch.float32), pixel_centres(width * many, height * many) / many)
-        origins, directions = (tensor.reshape(-1, 3).numpy() for tensor in (rays.origins, rays.directions))
-        hits = self._rays.first_hits(origins, directions)
-        towards = camera.world_from_camera[:3, 2].to("cpu", torch.float32)
-        colours = self._colours(
-            torch.from_numpy(hits.points), torch.from_numpy(self._normals[hits.triangles]), towards
-        )
-        fine = torch.zeros(len(origins), 5)
-        index = torch.from_numpy(hits.rays)
-        fine[index] = torch.cat(
-            (colours, torch.ones(len(index), 1), torch.from_numpy(hits.distances)[:, None]), dim=1
-        )
-        mean = fine.reshape(height, many, width, many, 5).mean(dim=(1, 3))
-        opacity = mean[..., 3]
-        seen = opacity > 0.0
-        depth = torch.where(seen, mean[..., 4] / torch.where(seen, opacity, 1.0), _FAR)
-        return RenderOutput(rgb=mean[..., :3] + (1.0 - opacity)[..., None], opacity=opacity, depth=depth)
-
-    def _colours(self, points: Tensor, normals: Tensor, towards: Tensor) -> Tensor:
-        """Colours (K, 3) of surface points (K, 3) with normals (K, 3), for a camera in a direction (3,)."""
-        choice = self._choose_views(points, normals, towards)
-        colours = torch.zeros(len(points), 3)
-        for view, camera_maps in enumerate(self._premultiplied):
-            chosen = choice == view
-            pixels, _, _ = project(self._cameras[view], points[chosen])
-            value = _look_up(camera_maps, pixels)
-            colours[chosen] = (value[:, :3] / value[:, 3:].clamp_min(1e-3)).clamp(0.0, 1.0)
-        return colours
-
-    def _choose_views(self, points: Tensor, normals: Tensor, towards: Tensor) -> Tensor:
-        """Which source view colours each point, (K,): the nearest to the camera of those that see it.
-
-        A point that none sees takes the view that faces its surface most squarely, from either side: the
-        far side of the side drawing is a better guess than the streaks of an edge.
-        """
-        scores = []
-        for view in range(len(self._premultiplied)):
-            pose = self._cameras.world_from_camera[view]
-            axis = pose[:3, 2]
-            if bool(self._cameras.orthographic[view]):
-                to_source = axis.expand_as(points)
-            else:
-                to_source = safe_normalize(pose[:3, 3] - points)
-            facing = (normals * to_source).sum(-1)
-            seen = facing > _MIN_FACING
-            starts = points[seen] + _RAY_OFFSET * normals[seen]
-            free = ~self._rays.occluded(starts.numpy(), to_source[seen].numpy())
-            seen[seen.clone()] = torch.from_numpy(free)
-            scores.append(torch.where(seen, 10.0 + axis @ towards, facing.abs()))
-        return torch.stack(scores).argmax(dim=0)
+        return white_prediction(camera) if self.mesh is None else self._projected.render(camera)

@@ -21,8 +21,15 @@ from charnerf.evaluation.metrics_file import (
     write_metrics,
     write_views,
 )
+from charnerf.evaluation.nearest import (
+    NO_MATCH,
+    NO_TRAINING_SET,
+    Nearest,
+    NearestBaseline,
+    TrainingCharacters,
+)
 from charnerf.evaluation.pictures import save_prediction, save_sheet
-from charnerf.evaluation.scores import CharacterScores, score_view, to_cpu
+from charnerf.evaluation.scores import METRIC_KEYS, CharacterScores, score_view, to_cpu
 from charnerf.geometry.cameras import fibonacci_hemisphere
 from charnerf.types import Cameras, LeftOut, RenderOutput, SourceViews
 
@@ -50,6 +57,7 @@ class MadeMesh(Protocol):
         """Work that was not done."""
 
 
+BASELINES = ("white", "visual_hull", "nearest")
 MakeMesh = Callable[[Any, SourceViews], MadeMesh]
 """From a scene and its drawings (B = 1) to its mesh."""
 
@@ -129,6 +137,7 @@ def evaluate(
     mesh: MakeMesh | None = None,
     device: torch.device | str = "cpu",
     baselines: bool = True,
+    nearest: TrainingCharacters | None = None,
     train_seconds: float | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
@@ -144,7 +153,8 @@ def evaluate(
             sheet a character, `images/NAME/sheet.png`, and every view's metrics, `views.csv`; None keeps none.
         mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them null.
         device: Where the model is.
-        baselines: Whether to measure `white` and `visual_hull` too.
+        baselines: Whether to measure `white`, `visual_hull` and `nearest` too.
+        nearest: Characters that the model was trained on, for the baseline `nearest`; None leaves it null.
         train_seconds: Training time to report; None where it is unknown.
         progress: Whether to draw a progress bar with the time left.
 
@@ -157,7 +167,7 @@ def evaluate(
     """
     device = torch.device(device)
     names = names_of(read_dataset(root), split)
-    state = Collected(device, ("ours", "white", "visual_hull") if baselines else ("ours",))
+    state = Collected(device, ("ours", *BASELINES) if baselines else ("ours",))
     with (
         state.watch,
         tqdm(total=0, desc=f"evaluate {split}", unit="view", disable=not progress) as bar,
@@ -166,7 +176,13 @@ def evaluate(
             character = load_character(root, name)
             indices = fixed_views(character, views)
             bar.total = bar.n + len(indices) * (len(names) - place)  # the others are taken to have as many
-            _evaluate_character(state, model, renderer, character, indices, output=output, mesh=mesh, bar=bar)
+            close = None if nearest is None or not baselines else nearest.nearest(character)
+            _evaluate_character(
+                state, model, renderer, character, indices, output=output, mesh=mesh, close=close, bar=bar
+            )
+            if baselines and close is None:
+                why = NO_TRAINING_SET if nearest is None else NO_MATCH
+                state.scores["nearest"][name] = CharacterScores(reasons=dict.fromkeys(METRIC_KEYS, why))
     if output is not None:
         write_views(output / VIEWS_FILE, state)
     found = collected_metrics(state, names, split=split, train_seconds=train_seconds)
@@ -182,6 +198,7 @@ def _evaluate_character(
     *,
     output: Path | None,
     mesh: MakeMesh | None,
+    close: Nearest | None,
     bar: "tqdm[Any]",
 ) -> None:
     """Add one character to what is collected."""
@@ -190,7 +207,8 @@ def _evaluate_character(
     with torch.no_grad():
         with watch.stage("encode"):
             scene = model.scene(model.encode(sources), 0)
-        drawn: dict[str, list[RenderOutput]] = {method: [] for method in state.scores}
+        methods = [method for method in state.scores if method != "nearest" or close is not None]
+        drawn: dict[str, list[RenderOutput]] = {method: [] for method in methods}
         for index in indices:
             with watch.stage("render"):
                 rendering = renderer.render_camera(scene, character.cameras[index].to(watch.device))
@@ -199,15 +217,16 @@ def _evaluate_character(
             bar.update()
         surface = "no mesh was made" if mesh is None else _make_mesh(state, mesh, scene, sources)
     truth = None if character.mesh_file is None else surface_error.true_points(character.mesh_file)
-    hull_mesh = _draw_baselines(state, drawn, character, indices)
+    hull_mesh = _draw_baselines(state, drawn, character, indices, close)
     images = character.images(indices)
     _score(state, character, indices, images, drawn)
     for method, found in (
         ("ours", surface),
         ("white", "the white picture has no surface"),
         ("visual_hull", hull_mesh),
+        ("nearest", None if close is None else close.mesh),
     ):
-        if method in state.scores:
+        if method in drawn:
             _score_surface(state.scores[method][name], found, truth, character.cameras)
     if output is not None:
         stems = [character.image_files[index].stem for index in indices]
@@ -228,11 +247,19 @@ def _make_mesh(state: Collected, mesh: MakeMesh, scene: Any, sources: SourceView
 
 
 def _draw_baselines(
-    state: Collected, drawn: dict[str, list[RenderOutput]], character: Character, indices: list[int]
+    state: Collected,
+    drawn: dict[str, list[RenderOutput]],
+    character: Character,
+    indices: list[int],
+    close: Nearest | None,
 ) -> trimesh.Trimesh | None:
     """Draw the baselines of one character; returns the hull's mesh."""
     if "visual_hull" not in drawn:
         return None
+    if close is not None:
+        state.nearest[character.name] = {"character": close.name, "silhouette_iou_of_sources": close.iou}
+        remembered = NearestBaseline(close, character.sources)
+        drawn["nearest"] = [remembered.render(character.cameras[index]) for index in indices]
     with state.watch.stage("hull_encode"):
         hull = VisualHullBaseline(character.sources)
     for index in indices:

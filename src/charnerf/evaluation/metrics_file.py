@@ -26,12 +26,14 @@ class Collected:
     Attributes:
         watch: Seconds and memory of the stages.
         left_out: Work that was not done, summed.
+        nearest: By character, the training character that the baseline `nearest` took, and how well it fits.
         scores: By method ("ours" and the baselines), then by character.
     """
 
     def __init__(self, device: torch.device, methods: Sequence[str]) -> None:
         self.watch = Stopwatch(device)
         self.left_out = LeftOut()
+        self.nearest: dict[str, dict[str, Any]] = {}
         self.scores: dict[str, dict[str, CharacterScores]] = {method: {} for method in methods}
 
 
@@ -62,13 +64,15 @@ def collected_metrics(
 
 
 def _baselines(state: Collected, names: Sequence[str]) -> dict[str, Any]:
-    """Every metric of the baselines; the hull's seconds too."""
+    """Every metric of the baselines; the hull's seconds, and which training characters were nearest."""
     found: dict[str, Any] = {}
     for method, by_name in state.scores.items():
         if method != "ours":
             scores = [by_name[name] for name in names]
             found[method] = summarize(scores)
             found[method]["by_azimuth"] = by_azimuth([each.views for each in scores], VIEW_KEYS)
+    if "nearest" in found:
+        found["nearest"]["found"] = state.nearest
     if "visual_hull" in found:
         found["visual_hull"]["seconds"] = {
             "encode": state.watch.median_seconds("hull_encode"),

@@ -60,6 +60,8 @@ def _panels(
     ]
     if "visual_hull" in drawn:
         rows.append(("visual hull", [drawn["visual_hull"][place].rgb for place in chosen]))
+    if "nearest" in drawn:
+        rows.append(("nearest", [drawn["nearest"][place].rgb for place in chosen]))
     rows.append(("opacity", [1.0 - picture.opacity[..., None].expand(-1, -1, 3) for picture in ours]))
     rows.append(("depth", [depth_picture(picture) for picture in ours]))
     return rows
@@ -79,7 +81,7 @@ def save_sheet(
         character: The character.
         indices: Its evaluated frames (n).
         images: Their true pictures, bytes (n, H, W, 4).
-        drawn: Predictions (n) by method; "ours" and perhaps "visual_hull".
+        drawn: Predictions (n) by method; "ours" and perhaps "visual_hull", "nearest".
     """
     angles = view_angles(character.cameras[list(indices)], character.sources)
     order = torch.argsort(angles.azimuth_deg).tolist()

@@ -13,6 +13,7 @@ from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
+from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.extract import vertex_colours
@@ -60,6 +61,7 @@ def finish_run(
         output=folder,
         mesh=make_mesh,
         device=device,
+        nearest=TrainingCharacters([(root, split) for split in cfg.sampling.train_splits]),
         train_seconds=train_seconds,
     )
     size = sum(parameter.numel() for parameter in model.parameters())
