@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import pytest
 import torch
+from PIL import Image
 
 import charnerf
 from charnerf import runs
+from charnerf.cli import run
 from charnerf.config.composition import compose_config
 from charnerf.finetuning import Recipe, finetune
 from charnerf.finetuning.report import write_finetuned
@@ -68,3 +70,18 @@ def test_what_was_not_kept_is_said_and_loads_too(model, person_views, tmp_path):
     assert again.note is not None and "not kept" in again.note
     for name, tensor in again.network.state_dict().items():
         assert torch.equal(tensor, model.network.state_dict()[name])
+
+
+def test_the_command_writes_weights_that_reconstruct_can_use(model, person_views, tmp_path, capsys):
+    drawings = []
+    for view, name in enumerate(("front", "side", "back")):
+        picture = (255 * person_views.images[0, view].permute(1, 2, 0)).round().byte().numpy()
+        drawings.append(tmp_path / f"{name}.png")
+        Image.fromarray(picture).resize((96, 96)).save(drawings[-1])
+    arguments = [*map(str, drawings), "-o", str(tmp_path / "fitted"), "--weights", str(model.source)]
+    assert run(["finetune", *arguments, "--seconds", "2", "--device", "cpu"]) == 0
+    told = capsys.readouterr().err
+    assert "floor line" in told and "Left out" in told and "report.md" in told
+    assert charnerf.load(tmp_path / "fitted").note is not None
+    assert run(["finetune", *arguments, "--seconds", "0"]) == 2
+    assert run(["finetune", *arguments[:3], "-o", str(drawings[0]), "--seconds", "2"]) != 0
