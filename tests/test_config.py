@@ -102,7 +102,7 @@ def test_typos_name_the_full_key_and_the_nearest_name() -> None:
     assert problem("budget.step=3") == "budget.step: unknown key; did you mean 'steps'?"
     assert (
         problem("+optimizer.lrr=1.0")
-        == "optimizer.lrr: torch.optim.Adam takes no argument 'lrr'; did you mean 'lr'?"
+        == "optimizer.lrr: charnerf.training.muon.MuonWithAdam takes no argument 'lrr'; did you mean 'lr'?"
     )
     assert (
         problem("+trainer.limit_val_batch=1")

@@ -125,7 +125,7 @@ class RunConfig:
     loss: _part("charnerf.losses")  # type: ignore[valid-type]
     schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
     data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
-    optimizer: _part("torch.optim", given=["params"])  # type: ignore[valid-type]
+    optimizer: _part("torch.optim", "charnerf.training", given=["params"])  # type: ignore[valid-type]
     trainer: _part("lightning", given=TRAINER_GIVEN)  # type: ignore[valid-type]
 
 
