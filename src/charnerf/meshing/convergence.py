@@ -1,0 +1,170 @@
+"""How many cameras the averaged density needs, and how much densities depend on the direction at all."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+import trimesh
+
+from charnerf.geometry.safe import safe_normalize
+from charnerf.meshing.calibrate import choose_level
+from charnerf.meshing.density_grid import GridSampler, camera_positions
+from charnerf.meshing.distance import surface_chamfer_mm
+from charnerf.meshing.extract import extract_surface
+from charnerf.types import Scene, SourceViews
+
+COUNTS = (1, 2, 4, 8, 16)
+PROBES = 2_000  # points near the surface where directions are compared
+DIRECTIONS = 16
+STRONG = 0.25  # standard deviation over directions by the mean, from which on a mesh depends on the choice
+SETTLED_MM = 1.0  # a mesh this near to that of the most cameras counts as the same
+
+
+@dataclass(frozen=True)
+class ConvergenceRow:
+    """A mesh by some cameras.
+
+    Attributes:
+        num_cameras: N; 0 stands for the zero direction.
+        distance_mm: Chamfer distance to the mesh of the most cameras, mm.
+        volume: Of the mesh, m^3.
+        num_faces: Of the mesh.
+        seconds: For grid and surface.
+    """
+
+    num_cameras: int
+    distance_mm: float
+    volume: float
+    num_faces: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Mesh distance against the number of cameras.
+
+    Attributes:
+        rows: By number; empty where the density sees no direction, since one evaluation then is exact.
+        level: Density of all the surfaces, 1/m.
+        spread: Standard deviation of the density over directions by its mean, mean over points near the
+            surface.
+        exact: Whether the density sees no direction.
+    """
+
+    rows: tuple[ConvergenceRow, ...]
+    level: float
+    spread: float
+    exact: bool
+
+    @property
+    def enough(self) -> int:
+        """Fewest cameras whose mesh, and every one of more, is that of the most, within SETTLED_MM."""
+        settled = 1
+        for row in self.rows:
+            if row.num_cameras > 0 and row.distance_mm > SETTLED_MM:
+                settled = next(
+                    (one.num_cameras for one in self.rows if one.num_cameras > row.num_cameras),
+                    row.num_cameras,
+                )
+        return settled
+
+    @property
+    def warning(self) -> str | None:
+        """What is to be said where densities depend strongly on the direction."""
+        if self.spread <= STRONG:
+            return None
+        return (
+            f"the density depends strongly on the direction: near the surface it varies by {100 * self.spread:.0f} % "
+            f"(standard deviation over {DIRECTIONS} cameras), so that the mesh depends on how many cameras are "
+            f"averaged; {self.enough} are enough here. density=view_free has no such dependence."
+        )
+
+
+def measure_convergence(
+    scene: Scene,
+    views: SourceViews | None,
+    *,
+    resolution: int = 64,
+    counts: Sequence[int] = COUNTS,
+    level: float | None = None,
+) -> Convergence:
+    """Make a character's surface by several numbers of cameras and compare.
+
+    Args:
+        scene: One character's field.
+        views: Its drawings (B = 1), for the choice of the level.
+        resolution: Grid points along the longest side.
+        counts: Numbers of cameras, ascending; the last one is what the others are compared with.
+        level: Density of the surfaces, 1/m; None chooses it with the most cameras. The same for all, since
+            its effect is larger than that of the cameras.
+    """
+    most = 1 if not scene.density_sees_directions else max(counts)
+    if level is None:
+        sampler = GridSampler(scene, resolution=resolution, num_cameras=most)
+        level = choose_level(sampler.evaluate_coarse(2), views).chosen.level
+    reference, _ = _surface(scene, resolution, most, level)
+    spread = direction_spread(scene, np.asarray(reference.vertices))
+    if not scene.density_sees_directions:
+        return Convergence((), level, spread, True)
+    rows = []
+    for count in (0, *sorted(counts)):
+        # without a direction of its own the averaging asks with the zero direction, once
+        asked = replace(scene, density_sees_directions=False) if count == 0 else scene
+        mesh, seconds = _surface(asked, resolution, max(count, 1), level)
+        distance = surface_chamfer_mm(mesh, reference)
+        rows.append(ConvergenceRow(count, distance, float(mesh.volume), len(mesh.faces), seconds))
+    return Convergence(tuple(rows), level, spread, False)
+
+
+def _surface(scene: Scene, resolution: int, cameras: int, level: float) -> tuple[trimesh.Trimesh, float]:
+    start = time.perf_counter()
+    sampler = GridSampler(scene, resolution=resolution, num_cameras=cameras)
+    mesh = extract_surface(sampler.evaluate_surface(level), level, density_at=sampler.density_at).mesh
+    return mesh, time.perf_counter() - start
+
+
+@torch.no_grad()
+def direction_spread(scene: Scene, near: np.ndarray) -> float:
+    """Standard deviation of the density over directions by its mean, averaged over points (P, 3), m."""
+    chosen = near[:: max(1, len(near) // PROBES)].astype(np.float32)
+    points = torch.from_numpy(chosen).to(scene.box_min.device)
+    answers = torch.stack(
+        [
+            scene.answer_densities(points, safe_normalize(points - position)).densities.double()
+            for position in camera_positions(scene, DIRECTIONS).to(points)
+        ]
+    )
+    mean = answers.mean(0)
+    return float((answers.std(0, correction=0) / mean.clamp_min(1e-6)).mean())
+
+
+def convergence_lines(result: Convergence) -> list[str]:
+    """Markdown of a report."""
+    lines = ["## Cameras averaged over", ""]
+    if result.exact:
+        return [
+            *lines,
+            f"The density of these weights sees no direction (measured: it varies by {100 * result.spread:.2g} % over "
+            f"{DIRECTIONS} cameras near the surface): one evaluation is exact, whatever number of cameras is asked for.",
+            "",
+        ]
+    lines += [f"Surfaces at {result.level:.3g} per metre; Chamfer distance to that of the most cameras.", ""]
+    lines += ["| cameras | distance, mm | volume, l | faces | seconds |", "|---|---|---|---|---|"]
+    for row in result.rows:
+        name = f"{row.num_cameras}" if row.num_cameras else "none (zero direction)"
+        lines.append(
+            f"| {name} | {row.distance_mm:.2f} | {1000 * row.volume:.1f} | {row.num_faces} | {row.seconds:.1f} |"
+        )
+    lines += [
+        "",
+        f"{result.enough} cameras are enough (within {SETTLED_MM:g} mm). Near the surface the density varies "
+        f"by {100 * result.spread:.0f} % over directions.",
+        "",
+    ]
+    if result.warning is not None:
+        lines += [f"- **warning**: {result.warning}", ""]
+    return lines

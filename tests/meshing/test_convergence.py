@@ -1,0 +1,60 @@
+"""The convergence report: exact without directions, falling distances with them, a warning where it matters."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from analytic_scenes import scene_of, sphere
+
+from charnerf.meshing.convergence import (
+    convergence_lines,
+    direction_spread,
+    measure_convergence,
+)
+
+
+def _directed(strength: float):
+    """A sphere whose density swells towards one side of the viewer, by a share of itself."""
+    plain = scene_of(sphere, width=0.4)
+
+    def field(points, view_dirs):
+        answer = plain.field(points, view_dirs)
+        return dataclasses.replace(answer, densities=answer.densities * (1.0 + strength * view_dirs[:, 0]))
+
+    return dataclasses.replace(plain, field=field, density_sees_directions=True)
+
+
+def test_without_directions_one_evaluation_is_exact():
+    result = measure_convergence(scene_of(sphere, width=0.1), None, resolution=32)
+    assert result.exact and result.rows == () and result.spread == pytest.approx(0.0, abs=1e-9)
+    assert result.warning is None and result.enough == 1
+    assert "one evaluation is exact" in "\n".join(convergence_lines(result))
+
+
+def test_distances_fall_with_cameras_and_a_strong_dependence_warns():
+    result = measure_convergence(_directed(0.9), None, resolution=32, counts=(1, 4, 16), level=40.0)
+    assert [row.num_cameras for row in result.rows] == [0, 1, 4, 16]
+    by_count = {row.num_cameras: row.distance_mm for row in result.rows}
+    assert by_count[1] > by_count[4] > by_count[16]
+    assert by_count[16] == pytest.approx(0.0, abs=0.1)  # of samples of equal surfaces
+    assert result.spread > 0.25 and result.warning is not None and "strongly" in result.warning
+    text = "\n".join(convergence_lines(result))
+    assert "| none (zero direction) |" in text and "**warning**" in text
+
+
+def test_a_weak_dependence_does_not_warn():
+    result = measure_convergence(_directed(0.005), None, resolution=32, counts=(1, 4), level=60.0)
+    assert result.warning is None and result.enough == 1
+
+
+def test_spread_is_the_relative_deviation_over_directions():
+    scene = _directed(0.5)
+    near = np.array([[0.9, 0.0, 1.0], [0.0, 0.8, 1.3]])
+    points = torch.from_numpy(near).float()
+    from charnerf.meshing.density_grid import camera_positions
+
+    offset = points[:, None] - camera_positions(scene, 16)
+    factor = 1.0 + 0.5 * (offset / offset.norm(dim=-1, keepdim=True))[..., 0]
+    expected = (factor.std(1, correction=0) / factor.mean(1)).mean()
+    assert direction_spread(scene, near) == pytest.approx(float(expected), rel=1e-4)

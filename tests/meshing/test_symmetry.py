@@ -1,0 +1,92 @@
+"""The symmetric scene: its own mirror image, whatever the hull's box."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from analytic_scenes import box_hull, capsule, figure, scene_of
+
+from charnerf.geometry.hull import hull_contains
+from charnerf.meshing.density_grid import GridSampler, averaged_density
+from charnerf.meshing.distance import surface_chamfer_mm
+from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.symmetry import symmetric_hull, symmetric_scene
+from charnerf.types import Scene
+
+
+def _lopsided(points: torch.Tensor) -> torch.Tensor:
+    return torch.maximum(figure(points), capsule(points, (0.3, 0.0, 1.2), (0.5, -0.2, 1.0), 0.12))
+
+
+def _scene(shape=_lopsided, hull=None) -> Scene:
+    made = scene_of(shape, width=0.1)
+    return Scene(made.field, None, hull, made.box_min, made.box_max, False)
+
+
+def _hull(shape, low=(-1.0, -0.9, -0.1), high=(1.35, 0.9, 2.2), cells=40):
+    low, high = torch.tensor(low), torch.tensor(high)
+    axis = (torch.arange(cells) + 0.5) / cells
+    centres = low + (high - low) * torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1)
+    return box_hull((shape(centres.reshape(-1, 3)) > -0.1).reshape(cells, cells, cells), low, high)
+
+
+@pytest.mark.parametrize("with_hull", [False, True])
+def test_density_is_the_mean_of_both_sides(with_hull):
+    scene = _scene(hull=_hull(_lopsided) if with_hull else None)
+    points = torch.rand(4000, 3) * torch.tensor([2.6, 1.6, 2.3]) - torch.tensor([1.3, 0.8, 0.1])
+    flip = torch.tensor([-1.0, 1.0, 1.0])
+    expected = 0.5 * (averaged_density(scene, points, 1) + averaged_density(scene, points * flip, 1))
+    made = symmetric_scene(scene)
+    found = averaged_density(made, points, 1)
+    torch.testing.assert_close(found, expected)
+    torch.testing.assert_close(averaged_density(made, points * flip, 1), found)
+    torch.testing.assert_close(made.field(points, torch.zeros_like(points)).densities, expected)
+
+
+def test_the_mesh_is_its_own_mirror_image():
+    scene = symmetric_scene(_scene(hull=_hull(_lopsided)))
+    sampler = GridSampler(scene, resolution=64, num_cameras=1)
+    mesh = extract_surface(sampler.evaluate_surface(60.0), 60.0, density_at=sampler.density_at).mesh
+    mirror = mesh.copy()
+    mirror.vertices = mesh.vertices * (-1.0, 1.0, 1.0)
+    on_the_surface = np.abs(sampler.density_at(np.asarray(mirror.vertices)) - 60.0) < 3.0
+    assert on_the_surface.mean() > 0.99  # each vertex' mirror image lies on the surface
+    assert surface_chamfer_mm(mesh, mirror) < 1.0  # a cell is 40 mm
+    assert mesh.is_watertight and abs(mesh.center_mass[0]) < 1e-3
+
+
+def test_a_symmetric_scene_stays_as_it_is():
+    scene = _scene(figure)
+    points = torch.rand(500, 3) * 2 - torch.tensor([1.0, 1.0, 0.0])
+    before, after = scene.field(points, points), symmetric_scene(scene).field(points, points)
+    torch.testing.assert_close(after.densities, before.densities, rtol=1e-4, atol=1e-4)
+
+
+def test_colours_stay_on_their_side():
+    """A badge on one side is not doubled; a side that is empty takes the other's colour."""
+    plain = _scene(figure)
+
+    def badged(points, view_dirs):
+        answer = plain.field(points, view_dirs)
+        rgb = torch.where(
+            (points[:, 0] > 0)[:, None], points.new_tensor((1.0, 0, 0)), points.new_tensor((0, 0, 1.0))
+        )
+        return dataclasses.replace(answer, rgb=rgb)
+
+    made = symmetric_scene(dataclasses.replace(plain, coarse=badged))
+    points = torch.tensor([[0.1, 0.0, 1.2], [-0.1, 0.0, 1.2]])
+    answer = made.answer_densities(points, torch.zeros(2, 3))
+    rgb = answer.colours(answer.state)
+    assert rgb[0, 0] > 0.98 and rgb[1, 2] > 0.98
+
+
+def test_the_hull_holds_both_sides():
+    hull = _hull(_lopsided)
+    wide = symmetric_hull(hull)
+    points = torch.rand(20_000, 3) * torch.tensor([2.8, 1.8, 2.3]) - torch.tensor([1.4, 0.9, 0.1])
+    flip = torch.tensor([-1.0, 1.0, 1.0])
+    needed = hull_contains(hull, points) | hull_contains(hull, points * flip)
+    assert bool(hull_contains(wide, points)[needed].all())
+    assert torch.equal(wide.occupancy, wide.occupancy.flip(0))
+    assert float(hull_contains(wide, points).float().mean()) < 1.6 * float(needed.float().mean())
