@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from charnerf.cli_finetune import finetune
 from charnerf import cli_meshes
+from charnerf.cli_finetune import finetune
 from charnerf.cli_options import (
     Dataset,
     Depth,
@@ -182,6 +182,7 @@ def evaluate(
 
 app.command(epilog=DEBUG_NOTE)(cli_meshes.mesh)
 app.command(epilog=DEBUG_NOTE)(cli_meshes.reconstruct)
+app.command(epilog=DEBUG_NOTE)(finetune)
 
 
 @app.command(epilog=DEBUG_NOTE)

@@ -239,6 +239,26 @@ def reconstruct(
     say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")
 
 
+def finetune(
+    drawings: tuple[Path, Path, Path],
+    output: Path,
+    *,
+    weights: Path | None,
+    seconds: float,
+    side_is: Literal["left", "right"],
+    device: str,
+    trust: Sequence[str],
+) -> None:
+    """Adapt weights to a character's drawings, and tell what was assumed and whether it helped."""
+    from charnerf.finetuning.command import finetune_drawings
+
+    front, side, back = drawings
+    model = load_model(weights, device=device, trust=trust)
+    finetune_drawings(
+        model, front=front, side=side, back=back, output=output, seconds=seconds, side_is=side_is, say=say
+    )
+
+
 def report(folder: Path) -> None:
     """Write the report over all runs below a folder."""
     say(f"report: {write_folder_report(folder)}")
