@@ -49,7 +49,10 @@ WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may impor
     ("training", "meshing"),
     ("training", "reporting"),
     ("training", "runs"),
+    ("reporting", "drawings"),
     ("reporting", "evaluation"),
+    ("reporting", "model_api"),
+    ("reporting", "runs"),
 }
 ONLY_IN = {  # foreign package: where it may be imported
     "hydra": ("config", "runs"),

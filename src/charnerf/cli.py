@@ -188,13 +188,28 @@ app.command(epilog=DEBUG_NOTE)(finetune)
 @app.command(epilog=DEBUG_NOTE)
 def report(
     folder: Annotated[
-        Path, typer.Argument(metavar="FOLDER", exists=True, file_okay=False, help="Runs lie below it.")
+        Path,
+        typer.Argument(metavar="FOLDER", exists=True, file_okay=False, help="A run, or runs lie below it."),
     ],
+    *,
+    drawings: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            exists=True,
+            file_okay=False,
+            help="Show these drawings in every row: NAME/front.png, side.png, back.png, or pictures of fronts.",
+        ),
+    ] = None,
+    trust: Trusted = None,
 ) -> None:
-    """Write FOLDER/report.md and FOLDER/report.html over all runs below a folder."""
+    """Write FOLDER/report.md and FOLDER/report.html: of a run, or over all runs below a folder.
+
+    Runs that differ in their seed alone are one row. Interactive diagrams need plotly (the extra `report`).
+    """
     from charnerf import commands
 
-    commands.report(folder)
+    commands.report(folder, drawings=drawings, trust=trust or [])
 
 
 @app.command(epilog=DEBUG_NOTE)

@@ -27,7 +27,7 @@ from charnerf.meshing.lod import lod_table
 from charnerf.model_api import Model, TextureKind
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
 from charnerf.reconstruction.meshes import MeshRequest, write_meshes
-from charnerf.reporting.folder_report import write_folder_report
+from charnerf.reporting.report import report as write_report
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
 
@@ -259,9 +259,9 @@ def finetune(
     )
 
 
-def report(folder: Path) -> None:
-    """Write the report over all runs below a folder."""
-    say(f"report: {write_folder_report(folder)}")
+def report(folder: Path, *, drawings: Path | None, trust: Sequence[str]) -> None:
+    """Write the report of a run, or over all runs below a folder."""
+    say(f"report: {write_report(folder, drawings=drawings, trusted=trust)}")
 
 
 def bench(

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from charnerf.errors import DataError
+from charnerf.reporting.attention import attention
 from charnerf.reporting.blocks import Block, Heading, Text
 from charnerf.reporting.by_angle import by_angle
 from charnerf.reporting.characters import characters
 from charnerf.reporting.comparison import best_row, comparison, costs, sorted_rows, unfinished
+from charnerf.reporting.drawn import drawn_matrix
 from charnerf.reporting.matrix import matrix
 from charnerf.reporting.parts import verdict, write_report
 from charnerf.reporting.rows import Row, Run, common_overrides, group_rows, read_runs, read_unfinished
@@ -15,17 +17,22 @@ from charnerf.reporting.trends import trends
 from charnerf.reporting.verdicts import significance
 
 
-def write_folder_report(folder: str | Path) -> Path:
+def write_folder_report(
+    folder: str | Path, *, drawings: Path | None = None, trusted: Sequence[str] = ()
+) -> Path:
     """Write report.md and report.html over all runs below a folder.
 
     Args:
         folder: Any folder; every metrics.json below it is a run. Runs that differ in their seed alone are one row.
+        drawings: A folder of drawings to show through every row.
+        trusted: Modules of the user's own classes that the runs' configs may name.
 
     Returns:
         The Markdown file.
 
     Raises:
-        DataError: If there is no run below it, or one of its files is unreadable.
+        DataError: If there is no run below it, one of its files is unreadable, or there are no drawings where some are
+            asked for.
     """
     folder = Path(folder)
     runs = read_runs(folder)
@@ -43,6 +50,9 @@ def write_folder_report(folder: str | Path) -> Path:
     blocks += trends(rows, folder)
     blocks += by_angle(rows, folder)
     blocks += matrix(rows, folder)
+    if drawings is not None:
+        blocks += drawn_matrix(rows, drawings, folder, trusted=trusted)
+    blocks += attention(rows, folder, trusted=trusted)
     blocks += characters(rows)
     return write_report(folder, title, blocks)
 

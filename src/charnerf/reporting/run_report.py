@@ -1,6 +1,6 @@
 """report.md and report.html of one run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -101,11 +101,12 @@ def _chosen(sheets: Mapping[str, Picture]) -> list[str]:
     return list(dict.fromkeys([names[-1], names[len(names) // 2], names[0]])) if names else []
 
 
-def write_run_report(run_folder: str | Path) -> Path:
+def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> Path:
     """Write report.md and report.html of a run from its metrics.json, curve.csv, config.yaml and images/.
 
     Args:
         run_folder: The run; only metrics.json must be there.
+        more: Blocks to stand before what was spent.
 
     Returns:
         The Markdown file.
@@ -135,6 +136,7 @@ def write_run_report(run_folder: str | Path) -> Path:
     rest = [sheets[name] for name in sheets if name not in shown][: MAX_SHEETS - len(shown)]
     if rest:
         blocks += [Heading("More characters"), *rest]
+    blocks += more
     blocks += _spent(metrics)
     reasons = _reasons(metrics)
     if reasons:

@@ -1,0 +1,209 @@
+"""What view attention looks at: its scaled dot products split into feature and view part, around the character.
+
+Source: paper, Analysis of multi-view feature vector combination. What the paper leaves open is chosen here: the points are
+those that a camera sees, one a pixel, at the expected depth of its ray, where the picture is more opaque than not.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from charnerf.data.characters import Character
+from charnerf.data.layout import read_json, write_text_atomically
+from charnerf.errors import ConfigError, DataError
+from charnerf.geometry.cameras import cameras_towards, direction_from_angles, pixel_centres, pixel_rays
+from charnerf.models.charnerf import CharNeRF
+from charnerf.models.combinators.base import masked_logits, view_weights
+from charnerf.models.combinators.view_attention import AttentionLogits, ViewAttention
+from charnerf.types import Cameras, Scene
+
+ATTENTION_FILE = "attention.json"
+AZIMUTH_STEP_DEG = 5
+SIZE = 48  # pixels
+HALF_EXTENT, DISTANCE, HEIGHT = 1.4, 4.0, 1.0  # metres, of the cameras around (0, 0, HEIGHT)
+
+
+@dataclass(frozen=True)
+class AttentionProfile:
+    """Means over points, views' rows and characters, by azimuth (A), head (K) and source view (V).
+
+    Attributes:
+        characters: Names.
+        sources: Names of the V source views.
+        azimuth_deg: (A).
+        features: Feature part of the scaled dot product, (A, K).
+        view: View part, (A, K).
+        weights: Attention weight of each source view, (A, K, V).
+        curve: View part by theory: the factor of view_factor times the sum over the sources of the cosine to them, (A).
+        view_factor: s^2 / sqrt(d_k) / V, of the trained model.
+        num_points: Points in all.
+    """
+
+    characters: list[str]
+    sources: list[str]
+    azimuth_deg: list[float]
+    features: list[list[float]]
+    view: list[list[float]]
+    weights: list[list[list[float]]]
+    curve: list[float]
+    view_factor: float
+    num_points: int
+
+
+@dataclass(frozen=True)
+class _Call:
+    """What the combinator was given."""
+
+    view_features: Tensor
+    view_dirs: Tensor
+    source_dirs: Tensor
+    valid: Tensor
+
+
+def mean_parts(logits: AttentionLogits, valid: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Means over points (P), rows and keys of both parts, (K,) each, and of the weights over points and rows, (K, V)."""
+    weights = torch.softmax(masked_logits(logits.features + logits.view, valid), dim=-1)
+    rows = view_weights(valid, weights.dtype)[:, None, :, None]
+    return logits.features.mean((0, 2, 3)), logits.view.mean((0, 2, 3)), (weights * rows).sum(2).mean(0)
+
+
+def view_attention_of(network: CharNeRF) -> ViewAttention:
+    """The combinator of the finest field.
+
+    Raises:
+        ConfigError: If it is another one.
+    """
+    combinator = (network.fine or network.coarse).combinator
+    if not isinstance(combinator, ViewAttention):
+        raise ConfigError(
+            f"combinator: found {type(combinator).__name__}, expected view_mha: only its dot products have a view part."
+        )
+    return combinator
+
+
+@torch.no_grad()
+def attention_profile(
+    network: CharNeRF,
+    renderer: Any,
+    characters: Sequence[Character],
+    *,
+    step_deg: int = AZIMUTH_STEP_DEG,
+    size: int = SIZE,
+) -> AttentionProfile:
+    """Look at characters from all around, at their own height, and average what attention does at the points seen.
+
+    Args:
+        network: With `view_mha`, in eval mode.
+        renderer: Its renderer.
+        characters: With the same source views.
+        step_deg: Between azimuths.
+        size: Side of the pictures whose pixels give the points.
+
+    Raises:
+        ConfigError: If the combinator is another one.
+        DataError: If a camera sees nothing of a character.
+    """
+    combinator = view_attention_of(network)
+    device = network.box[0].device
+    azimuths = [float(azimuth) for azimuth in range(0, 360, step_deg)]
+    scenes = [network.scene(network.encode(one.sources.to(device)), 0) for one in characters]
+    found, count = [], 0
+    for azimuth in azimuths:
+        camera = _camera(azimuth, size).to(device)
+        calls = [
+            _seen(combinator, scene, renderer, camera, one.name)
+            for scene, one in zip(scenes, characters, strict=True)
+        ]
+        parts = [
+            mean_parts(combinator.logits(c.view_features, c.view_dirs, c.source_dirs), c.valid) for c in calls
+        ]
+        found.append([torch.stack(each).mean(0).cpu() for each in zip(*parts, strict=True)])
+        count += sum(len(call.valid) for call in calls)
+    num_views = found[0][2].shape[-1]
+    factor = float(combinator.scale * combinator.view_scale.square() / num_views)
+    sources = network.views(characters[0].sources)
+    towards = sources.cameras.world_from_camera[0, :, :3, 2].double()
+    around = direction_from_angles(
+        torch.tensor(azimuths, dtype=torch.float64), torch.zeros(len(azimuths), dtype=torch.float64)
+    )
+    names = [*characters[0].source_names]
+    names += [f"mirrored {number}" for number in range(1, num_views - len(names) + 1)]
+    return AttentionProfile(
+        characters=[one.name for one in characters],
+        sources=names,
+        azimuth_deg=azimuths,
+        features=[one[0].tolist() for one in found],
+        view=[one[1].tolist() for one in found],
+        weights=[one[2].tolist() for one in found],
+        curve=(factor * (around @ towards.T).sum(-1)).tolist(),
+        view_factor=factor,
+        num_points=count,
+    )
+
+
+def _camera(azimuth_deg: float, size: int) -> Cameras:
+    """Camera of shape () at the height of the character's middle."""
+    angles = torch.tensor([azimuth_deg, 0.0], dtype=torch.float64)
+    cameras = cameras_towards(
+        direction_from_angles(angles[0], angles[1])[None],
+        target=torch.tensor([0.0, 0.0, HEIGHT], dtype=torch.float64),
+        distance=DISTANCE,
+        half_extent=HALF_EXTENT,
+        size=size,
+        orthographic=False,
+    )
+    return cameras.to(torch.float32)[0]
+
+
+def _seen(combinator: ViewAttention, scene: Scene, renderer: Any, camera: Cameras, name: str) -> _Call:
+    """What the combinator is given at the points that a camera sees, one a pixel."""
+    picture = renderer.render_camera(scene, camera).finest
+    rays = pixel_rays(camera, pixel_centres(camera.width, camera.height, device=picture.depth.device))
+    seen = picture.opacity > 0.5
+    if not bool(seen.any()):
+        raise DataError(
+            f"{name}: the model shows nothing of it, expected points to look at; was it trained long enough?"
+        )
+    directions = rays.directions[seen]
+    points = rays.origins[seen] + picture.depth[seen][:, None] * directions
+    with _recorded(combinator) as calls:
+        scene.field(points, directions)
+    return next(
+        call for call in reversed(calls) if bool(call.view_dirs.any())
+    )  # not those asked without a direction
+
+
+@contextmanager
+def _recorded(combinator: ViewAttention) -> Iterator[list[_Call]]:
+    """Collect what a combinator is given while the context lasts."""
+    calls: list[_Call] = []
+    handle = combinator.register_forward_pre_hook(lambda _, given: calls.append(_Call(*given)))
+    try:
+        yield calls
+    finally:
+        handle.remove()
+
+
+def write_profile(path: Path, profile: AttentionProfile) -> None:
+    """Write a profile as JSON, in one step."""
+    write_text_atomically(path, json.dumps(asdict(profile)) + "\n")
+
+
+def read_profile(path: Path) -> AttentionProfile:
+    """Read a profile.
+
+    Raises:
+        DataError: If it is missing or another file.
+    """
+    try:
+        return AttentionProfile(**read_json(path))
+    except TypeError as error:
+        raise DataError(
+            f"{path}: found other keys ({error}), expected an attention profile; remove the file."
+        ) from error
