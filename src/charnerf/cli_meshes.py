@@ -12,6 +12,15 @@ Height = Annotated[
     float, typer.Option(min=0.001, metavar="M", help="Exact height of the mesh, m; its lowest point is at 0.")
 ]
 Resolution = Annotated[int, typer.Option(min=16, max=1024, help="Grid points along the mesh's longest side.")]
+Smooth = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Rounds of smoothing of the surface; it does not shrink.")
+]
+Symmetric = Annotated[
+    bool,
+    typer.Option(
+        "--symmetric", help="Average densities over left and right: for characters that are symmetric."
+    ),
+]
 Texture = Annotated[
     Literal["drawings", "field", "vertex"],
     typer.Option(
@@ -57,6 +66,15 @@ def mesh(
         ),
     ] = None,
     cameras: Cameras = 8,
+    convergence: Annotated[
+        bool,
+        typer.Option(
+            "--convergence",
+            help="Also measure how many cameras are needed, and show levels beside the chosen one: DIR/NAME_cameras.md.",
+        ),
+    ] = False,
+    smooth: Smooth = 0,
+    symmetric: Symmetric = False,
     height: Height = 2.0,
     texture: Texture = "vertex",
     texture_size: TextureSize = 1024,
@@ -80,6 +98,9 @@ def mesh(
         faces=numbers(faces, "--faces", 4),
         are_levels=lod is not None,
         num_cameras=cameras,
+        smooth=smooth,
+        symmetric=symmetric,
+        convergence=convergence,
         height=height,
         texture=texture,
         texture_size=texture_size,

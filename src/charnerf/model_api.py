@@ -15,6 +15,7 @@ from charnerf.errors import ConfigError, ShapeError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.lod import Lod, build_lods
+from charnerf.meshing.symmetry import symmetric_scene
 from charnerf.meshing.texture import TEXTURE_SIZE, Texturing
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import Cameras, Scene, SourceViews
@@ -151,6 +152,7 @@ class Hero:
         resolution: int = 256,
         num_cameras: int = 8,
         faces: int | None = None,
+        smooth: int = 0,
         height: float = HEIGHT,
         texture: TextureKind = "vertex",
         texture_size: int = TEXTURE_SIZE,
@@ -162,6 +164,7 @@ class Hero:
             num_cameras: Cameras whose directions the density is averaged over (one where the density sees no
                 direction).
             faces: Faces after decimation; None keeps all. A texture takes a second for 4000 faces.
+            smooth: Rounds of smoothing; it does not shrink.
             height: Its exact height, m.
             texture: vertex: colours at vertices, by the field. drawings: a base-colour texture from the
                 drawings, by the field where none sees the surface. field: a texture by the field alone.
@@ -171,6 +174,7 @@ class Hero:
             resolution=resolution,
             num_cameras=num_cameras,
             faces=faces,
+            smooth=smooth,
             height=height,
             texture=texture,
             texture_size=texture_size,
@@ -182,6 +186,7 @@ class Hero:
         resolution: int,
         num_cameras: int,
         faces: int | None,
+        smooth: int = 0,
         height: float = HEIGHT,
         texture: TextureKind = "vertex",
         texture_size: int = TEXTURE_SIZE,
@@ -195,10 +200,15 @@ class Hero:
                 resolution=resolution,
                 num_cameras=num_cameras,
                 faces=faces,
+                smooth=smooth,
                 height=height,
                 texturing=self.texturing(texture, texture_size),
                 on_points=on_points,
             )
+
+    def symmetric(self) -> Hero:
+        """The character as its own mirror image: densities averaged over left and right, for meshes and views."""
+        return replace(self, scene=symmetric_scene(self.scene))
 
     def lods(
         self,
@@ -206,6 +216,7 @@ class Hero:
         resolutions: Sequence[int],
         faces: Sequence[int] = (),
         num_cameras: int = 8,
+        smooth: int = 0,
         height: float = HEIGHT,
         texture: TextureKind = "vertex",
         texture_size: int = TEXTURE_SIZE,
@@ -217,7 +228,8 @@ class Hero:
         Args:
             resolutions: Grids, points along the longest side.
             faces: Faces to decimate the finest grid's surface to.
-            num_cameras: As of `mesh`, as are the next three.
+            num_cameras: As of `mesh`, as are the next four.
+            smooth: Rounds of smoothing of each grid's surface.
             height: Exact height of each, m.
             texture: Their colours.
             texture_size: Texels a side.
@@ -234,6 +246,7 @@ class Hero:
                 resolutions=resolutions,
                 faces=faces,
                 num_cameras=num_cameras,
+                smooth=smooth,
                 height=height,
                 texturing=self.texturing(texture, texture_size),
                 decimated_only=decimated_only,

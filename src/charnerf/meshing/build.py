@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import trimesh
 
@@ -12,6 +12,7 @@ from charnerf.meshing.calibrate import LevelChoice, choose_level
 from charnerf.meshing.colour import colour_vertices
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
+from charnerf.meshing.smooth import smooth_mesh
 from charnerf.meshing.texture import Textured, Texturing, texture_mesh
 from charnerf.types import LeftOut, Scene, SourceViews
 
@@ -70,6 +71,7 @@ def build_mesh(
     num_cameras: int = 8,
     faces: int | None = None,
     level: float | None = None,
+    smooth: int = 0,
     height: float | None = None,
     texturing: Texturing | None = None,
     on_points: Callable[[int], object] = lambda count: None,
@@ -83,6 +85,7 @@ def build_mesh(
         num_cameras: Cameras whose directions the density is averaged over.
         faces: Faces after decimation; None keeps all.
         level: Density of the surface, 1/m; None chooses it by rendered depths.
+        smooth: Rounds of smoothing, before decimation; it does not shrink.
         height: Height to scale to, m, with the lowest point on z = 0; None leaves size and place as the
             field has them.
         texturing: How to texture it; None gives vertex colours.
@@ -93,7 +96,13 @@ def build_mesh(
         NumericalError: If the field is empty or not finite.
     """
     found = find_surface(
-        scene, views, resolution=resolution, num_cameras=num_cameras, level=level, on_points=on_points
+        scene,
+        views,
+        resolution=resolution,
+        num_cameras=num_cameras,
+        level=level,
+        smooth=smooth,
+        on_points=on_points,
     )
     return finish_mesh(scene, found, faces=faces, height=height, texturing=texturing)
 
@@ -105,6 +114,7 @@ def find_surface(
     resolution: int,
     num_cameras: int,
     level: float | None = None,
+    smooth: int = 0,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> FoundSurface:
     """The surface of a field, all of its faces; arguments and errors as of `build_mesh`."""
@@ -116,6 +126,7 @@ def find_surface(
         level = choice.chosen.level
     grid = sampler.evaluate_surface(level)
     extraction = extract_surface(grid, level, density_at=sampler.density_at)
+    extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, smooth))
     return FoundSurface(extraction, choice, grid.left_out, time.perf_counter() - start)
 
 

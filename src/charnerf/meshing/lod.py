@@ -67,6 +67,7 @@ def build_lods(
     resolutions: Sequence[int],
     faces: Sequence[int] = (),
     num_cameras: int = 8,
+    smooth: int = 0,
     height: float | None = None,
     texturing: Texturing | None = None,
     decimated_only: bool = False,
@@ -80,6 +81,7 @@ def build_lods(
         resolutions: Grids, points along the longest side; at least one.
         faces: Faces to decimate the finest grid's surface to.
         num_cameras: Cameras whose directions the density is averaged over.
+        smooth: Rounds of smoothing of each grid's surface.
         height: Height to scale each to, m; None leaves size and place as the field has them.
         texturing: How to texture each; None gives vertex colours.
         decimated_only: Leave the grids' own meshes out.
@@ -99,7 +101,13 @@ def build_lods(
     for resolution in sorted(set(resolutions), reverse=True):
         start = time.perf_counter()
         found = find_surface(
-            scene, views, resolution=resolution, num_cameras=num_cameras, level=level, on_points=on_points
+            scene,
+            views,
+            resolution=resolution,
+            num_cameras=num_cameras,
+            level=level,
+            smooth=smooth,
+            on_points=on_points,
         )
         level, finest = found.extraction.level, finest or found
         if not decimated_only:

@@ -6,12 +6,13 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from charnerf.meshing.convergence import convergence_lines, measure_convergence
 from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh, write_aside
 from charnerf.meshing.lod import Lod, lod_report, named
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.model_api import HEIGHT, TEXTURE_SIZE, Hero, TextureKind
 from charnerf.reconstruction.progress import BAR, meter
-from charnerf.reconstruction.report import mesh_sentences, mesh_words
+from charnerf.reconstruction.report import level_lines, mesh_sentences, mesh_words
 
 STEPS = 20.0  # of the progress bar
 
@@ -25,6 +26,9 @@ class MeshRequest:
         faces: Faces of decimated meshes; with one grid and one number, the only mesh has so many.
         are_levels: Whether they are levels of detail even if there is but one grid.
         num_cameras: Cameras whose directions the density is averaged over.
+        smooth: Rounds of smoothing.
+        symmetric: Whether densities are averaged over left and right.
+        convergence: Whether it is measured how many cameras are needed: NAME_cameras.md.
         height: Of each, m.
         texture: vertex, drawings or field.
         texture_size: Texels a side.
@@ -35,6 +39,9 @@ class MeshRequest:
     faces: tuple[int, ...] = ()
     are_levels: bool = False
     num_cameras: int = 8
+    smooth: int = 0
+    symmetric: bool = False
+    convergence: bool = False
     height: float = HEIGHT
     texture: TextureKind = "vertex"
     texture_size: int = TEXTURE_SIZE
@@ -77,6 +84,7 @@ def write_meshes(hero: Hero, name: str, output: Path, request: MeshRequest) -> M
         DependencyError: If the format needs a library that is missing.
         NumericalError: If the field is empty or not finite.
     """
+    hero = hero.symmetric() if request.symmetric else hero
     found = _made(hero, name, request)
     output.mkdir(parents=True, exist_ok=True)
     paths = tuple(
@@ -89,6 +97,11 @@ def write_meshes(hero: Hero, name: str, output: Path, request: MeshRequest) -> M
     said += mesh_sentences(first)
     if request.texture != "vertex" and f".{request.suffix}" not in TEXTURED_SUFFIXES:
         said.append(f"{request.suffix.upper()} carries no texture: the vertices got its colours.")
+    if request.convergence:
+        lines = [f"# {name}: level and cameras", "", *level_lines(first), ""]
+        lines += convergence_lines(measure_convergence(hero.scene, hero.views, level=first.level))
+        write_aside(output / f"{name}_cameras.md", "\n".join(lines).encode())
+        said += [line for line in lines if line]
     if request.is_single:
         return MeshFiles(paths, sheet, {}, tuple(said))
     write_aside(output / "lods.md", lod_report(found).encode())
@@ -104,6 +117,7 @@ def _made(hero: Hero, name: str, request: MeshRequest) -> dict[str, Lod]:
             resolutions=request.resolutions,
             faces=request.faces,
             num_cameras=request.num_cameras,
+            smooth=request.smooth,
             height=request.height,
             texture=request.texture,
             texture_size=request.texture_size,

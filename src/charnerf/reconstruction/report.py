@@ -87,9 +87,14 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
 def _mesh_lines(built: BuiltMesh) -> list[str]:
     """How the mesh came about, and the evidence for its level."""
     lines = ["## Mesh", "", *(f"- {one}" for one in mesh_sentences(built))]
+    return [*lines, "", *level_lines(built)]
+
+
+def level_lines(built: BuiltMesh) -> list[str]:
+    """The density that the surface was drawn at, beside others: distance from rendered depths, silhouettes."""
     if built.choice is None:
-        return [*lines, "- The density was given, not chosen."]
-    lines += ["", "The density was chosen so that the surface lies where rendering, seen from around, loses"]
+        return [f"The density {built.level:.3g} per metre was given, not chosen."]
+    lines = ["The density was chosen so that the surface lies where rendering, seen from around, loses"]
     lines += ["half of its light. IoU: of the surface's silhouettes with the drawings.", ""]
     lines += ["| density | distance, mm | IoU |", "|---|---|---|"]
     tried = built.choice.tried
