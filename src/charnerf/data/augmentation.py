@@ -1,7 +1,7 @@
 """More characters from the ones there are: other proportions and other colours, the drawings and the rays changed alike.
 
 An affine map of the world takes rays to rays, so that the captured pictures stay true of the stretched character; orthographic
-drawings seen along an axis only change their width.
+drawings seen along an axis only change their width. Or the drawings become drawn ones, and the rays stay true.
 """
 
 from abc import ABC, abstractmethod
@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from charnerf.data.drawing_style import draw_pictures, random_style
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, TrainBatch
 
 ALIGNED = 0.999  # |cosine| of a viewing axis and a world axis
@@ -73,6 +74,78 @@ class StretchAndRecolor(AbstractAugmentation):
         if draws[3] < self.recolor_share:
             batch = recolor(batch, torch.randperm(3, generator=generator))
         return batch
+
+
+@final
+class DrawnSources(AbstractAugmentation):
+    """Source views as somebody would draw them, with the small contradictions of views drawn one by one.
+
+    Rays and points stay as captured, and so does the hull: what the drawings get wrong is to be averaged out, not learned.
+
+    Args:
+        drawing_share: Share of the characters whose source views are drawn.
+        wobble: Largest displacement by the unsteady hand, as a share of the picture's side.
+        shift: Largest offset of a view against the others, as a share of the side.
+        scale: Largest relative difference in size of a view.
+    """
+
+    def __init__(self, *, drawing_share: float, wobble: float, shift: float, scale: float) -> None:
+        self.drawing_share = drawing_share
+        self.mistakes = {"wobble": wobble, "shift": shift, "scale": scale}
+
+    def __call__(self, batch: TrainBatch, generator: torch.Generator) -> TrainBatch:
+        """Return the batch with its source views drawn at random."""
+        images = batch.views.images
+        drawn = [
+            draw_pictures(one, random_style(generator, **self.mistakes), generator)
+            if float(torch.rand((), generator=generator)) < self.drawing_share
+            else one
+            for one in images
+        ]
+        return replace(batch, views=replace(batch.views, images=torch.stack(drawn)))
+
+
+@final
+class StretchRecolorAndDraw(AbstractAugmentation):
+    """Other proportions and colours, and source views drawn.
+
+    Args:
+        stretch_share: See StretchAndRecolor, as the next three.
+        width_range: Factors on the width.
+        depth_range: Factors on the depth.
+        recolor_share: Share of the steps whose colour channels are permuted.
+        drawing_share: See DrawnSources, as the next three.
+        wobble: Of the hand, as a share of the side.
+        shift: Of a view, as a share of the side.
+        scale: Of a view.
+        used_views: The model's rule from drawings to views; a hull has maps for all of those.
+    """
+
+    def __init__(
+        self,
+        *,
+        stretch_share: float,
+        width_range: list[float],
+        depth_range: list[float],
+        recolor_share: float,
+        drawing_share: float,
+        wobble: float,
+        shift: float,
+        scale: float,
+        used_views: Callable[[SourceViews], SourceViews],
+    ) -> None:
+        self.change = StretchAndRecolor(
+            stretch_share=stretch_share,
+            width_range=width_range,
+            depth_range=depth_range,
+            recolor_share=recolor_share,
+            used_views=used_views,
+        )
+        self.draw = DrawnSources(drawing_share=drawing_share, wobble=wobble, shift=shift, scale=scale)
+
+    def __call__(self, batch: TrainBatch, generator: torch.Generator) -> TrainBatch:
+        """Return the batch changed, then drawn."""
+        return self.draw(self.change(batch, generator), generator)
 
 
 def _between(bounds: list[float], share: Tensor) -> Tensor:
