@@ -1,5 +1,7 @@
 """Models small enough to test, built part by part."""
 
+from typing import Any
+
 import torch
 from torch import nn
 
@@ -10,6 +12,7 @@ from charnerf.models.combinators.learned import LearnedWeights
 from charnerf.models.combinators.mean import Mean
 from charnerf.models.combinators.self_attention import SelfAttention
 from charnerf.models.combinators.view_attention import ViewAttention
+from charnerf.models.density.single_view import SingleViewDensity
 from charnerf.models.density.view_dependent import ViewDependentDensity
 from charnerf.models.density.view_free import ViewFreeDensity
 from charnerf.models.encoders.double import DoubleHourglass
@@ -19,21 +22,34 @@ from charnerf.models.features.image_hull import ImageHullFeatures
 from charnerf.models.field import Field
 from charnerf.models.heads.blend import BlendHead
 from charnerf.models.heads.radiance import RadianceHead
+from charnerf.models.single_view.base import AbstractSingleView
+from charnerf.models.single_view.camera import CameraSingleView
+from charnerf.models.single_view.world import WorldSingleView
 from charnerf.models.views.mirrored import MirroredSide
 from charnerf.models.views.turnaround import Turnaround
 
 WIDTH = 12
 FREQUENCIES = 3
+DENSITIES = {
+    "view_free": ViewFreeDensity,
+    "view_dependent": ViewDependentDensity,
+    "single_view": SingleViewDensity,
+}
 COMBINATORS = ("mean", "sa", "view_mha", "learned")
+
+
+def attention(**changes: Any) -> dict[str, Any]:
+    """Arguments of the paper's plain attention with two heads, some of them changed."""
+    plain = {"width": WIDTH, "num_heads": 2, "attention_width": None, "residual": False, "norm": True}
+    return {**plain, "temperature": None, "rate": 1.0, **changes}
 
 
 def combinator(name: str, *, width: int = WIDTH) -> AbstractCombinator:
     """A combinator by its option's name."""
-    attention = {"width": width, "num_heads": 2, "residual": False, "temperature": None}
     made = {
         "mean": Mean,
-        "sa": lambda: SelfAttention(**attention),
-        "view_mha": lambda: ViewAttention(**attention, view_scale=1.0),
+        "sa": lambda: SelfAttention(**attention(width=width)),
+        "view_mha": lambda: ViewAttention(**attention(width=width), view_scale=1.0),
         "learned": lambda: LearnedWeights(width=width, hidden=8),
     }
     return made[name]()
@@ -62,6 +78,14 @@ def double() -> DoubleHourglass:
     )
 
 
+def f1(name: str, *, num_extras: int = 0, num_blocks: int = 1) -> AbstractSingleView:
+    """f1 by its option's name."""
+    sizes = {"width": WIDTH, "num_extras": num_extras, "num_blocks": num_blocks}
+    if name == "camera":
+        return CameraSingleView(**sizes, octaves=2, factor=1.5)
+    return WorldSingleView(**sizes, num_frequencies=FREQUENCIES)
+
+
 def tiny_model(
     *,
     combining: str = "learned",
@@ -69,6 +93,7 @@ def tiny_model(
     density: str = "view_free",
     views: str = "turnaround",
     features: str = "image_hull",
+    single_view: str = "world",
     fine: bool = False,
     hull: bool = True,
 ) -> CharNeRF:
@@ -78,17 +103,13 @@ def tiny_model(
 
     def field() -> Field:
         return Field(
+            single_view=f1(single_view, num_extras=inputs.num_extras),
             combinator=combinator(combining),
-            density={"view_free": ViewFreeDensity, "view_dependent": ViewDependentDensity}[density](
-                width=WIDTH
-            ),
+            density=DENSITIES[density](width=WIDTH),
             head=BlendHead(width=WIDTH, hidden=8) if head == "blend" else RadianceHead(width=WIDTH),
             activation=ShiftedSoftplus(shift=-1.0, scale=20.0),
             feature_channels=encoder.out_channels,
-            encoded_size=6 * FREQUENCIES,
-            num_extras=inputs.num_extras,
             width=WIDTH,
-            num_single_view_blocks=1,
             num_multi_view_blocks=1,
         )
 
@@ -98,7 +119,6 @@ def tiny_model(
         features=inputs,
         coarse=field(),
         fine=field() if fine else None,
-        num_frequencies=FREQUENCIES,
         box_centre=[0.0, 0.0, 1.0],
         box_half_extent=1.8,
         hull=hull,

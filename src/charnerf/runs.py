@@ -17,7 +17,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 from yaml import YAMLError
 
-from charnerf.config import MODEL_SECTIONS, validate_model
+from charnerf.config import MODEL_SECTIONS, complete_model, validate_model
 from charnerf.errors import CharNeRFError, ConfigError, DataError
 from charnerf.model_api import Model
 from charnerf.models.charnerf import CharNeRF
@@ -57,15 +57,21 @@ def build_model(cfg: DictConfig) -> CharNeRF:
 
     def build_field() -> Field:
         return Field(
+            single_view=build_part(
+                cfg.single_view,
+                {
+                    **width,
+                    "num_frequencies": settings.num_frequencies,
+                    "num_extras": features.num_extras,
+                    "num_blocks": settings.num_single_view_blocks,
+                },
+            ),
             combinator=build_part(cfg.combinator, width),
             density=build_part(cfg.density, width),
             head=build_part(cfg.head, width),
             activation=build_part(settings.activation),
             feature_channels=encoder.out_channels,
-            encoded_size=2 * 3 * settings.num_frequencies,
-            num_extras=features.num_extras,
             width=cfg.model.width,
-            num_single_view_blocks=cfg.model.num_single_view_blocks,
             num_multi_view_blocks=cfg.model.num_multi_view_blocks,
         )
 
@@ -75,7 +81,6 @@ def build_model(cfg: DictConfig) -> CharNeRF:
         features=features,
         coarse=build_field(),
         fine=build_field() if cfg.renderer.num_fine > 0 else None,
-        num_frequencies=settings.num_frequencies,
         box_centre=list(settings.box_centre),
         box_half_extent=settings.box_half_extent,
         hull=settings.hull,
@@ -110,6 +115,7 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
     if file.is_dir():
         file = _weights_of_run(file)
     cfg, state = _read_safetensors(file) if file.suffix == ".safetensors" else _read_checkpoint(file)
+    cfg = complete_model(cfg)
     try:
         validate_model(cfg, trusted_targets=trusted_targets)
     except ConfigError as error:

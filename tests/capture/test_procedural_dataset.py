@@ -3,10 +3,12 @@
 import shutil
 
 import pytest
+import torch
 
 from charnerf.capture.procedural import dataset as module
 from charnerf.capture.procedural.dataset import SPLITS, ProceduralData, character_seed, generate_dataset
 from charnerf.data.characters import load_character
+from charnerf.data.folder import FolderData
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
 
@@ -80,6 +82,22 @@ def test_procedural_data_generates_once_under_a_name_for_its_settings(tmp_path, 
     settings = {"train": 1, "val": 0, "test": 0, "seed": 1, "size": 8, "views": 1, "cache": str(tmp_path)}
     roots = {ProceduralData(**{**settings, **other}).root for other in others}
     assert len(roots | {root}) == 5
+
+
+def test_depth_is_captured_only_where_it_is_asked_for(tmp_path):
+    """The same character, the same pictures, in a folder of its own."""
+    data = ProceduralData(train=1, val=0, test=0, seed=1, size=8, views=1, cache=str(tmp_path))
+    plain, deep = data.prepare(), data.prepare(depth=True)
+    assert plain != deep and data.prepare(depth=True) == deep and data.root == plain
+    one, other = (load_character(root, "train-00000") for root in (plain, deep))
+    assert not one.depth_files and (other.depths([0]) > 0).any()
+    assert torch.equal(one.images([0]), other.images([0]))
+    assert FolderData(root=str(deep)).prepare(depth=True) == deep
+    assert FolderData(root=str(plain)).prepare() == plain
+    with pytest.raises(DataError, match="charnerf capture --depth"):
+        FolderData(root=str(plain)).prepare(depth=True)
+    with pytest.raises(DataError, match=r"charnerf capture --depth.*loss\.weights\.depth=0"):
+        one.depths([0])
 
 
 def test_cache_follows_the_users_setting(monkeypatch, tmp_path):

@@ -24,7 +24,10 @@ WIDTH, HEADS, POINTS, VIEWS = 12, 3, 9, 4
 @pytest.fixture
 def attention():
     torch.manual_seed(3)
-    combinator = ViewAttention(width=WIDTH, num_heads=HEADS, residual=False, temperature=None, view_scale=1.7)
+    combinator = ViewAttention(
+        **{"width": WIDTH, "num_heads": HEADS, "attention_width": None, "residual": False, "norm": True},
+        **{"temperature": None, "view_scale": 1.7, "rate": 1.0},
+    )
     return tiny_models.shake(combinator.double())
 
 

@@ -1,6 +1,7 @@
 """Combinators: one feature whatever the number and order of views; the paper's logits split exactly."""
 
 import math
+from functools import partial
 
 import pytest
 import torch
@@ -117,9 +118,7 @@ def test_whether_the_query_is_seen_is_said_truly(name):
 @pytest.mark.parametrize("temperature", [None, 3.0])
 def test_split_logits_sum_to_the_plain_concatenated_dot_product(temperature):
     """Q = [V, s d], K = [V, s d_i] for every head, over sqrt(d_k + 3); a temperature scales the first."""
-    combine = ViewAttention(
-        width=WIDTH, num_heads=HEADS, residual=False, temperature=temperature, view_scale=0.7
-    ).double()
+    combine = ViewAttention(**tiny_models.attention(temperature=temperature), view_scale=0.7).double()
     features, dirs, sources, _ = inputs(4)
     logits = combine.logits(features, dirs, sources)
     size = WIDTH // HEADS
@@ -138,15 +137,16 @@ def test_split_logits_sum_to_the_plain_concatenated_dot_product(temperature):
 def test_without_view_scale_it_is_self_attention():
     """The two differ by sqrt(d_k + 3) against sqrt(d_k) alone, which a temperature takes away."""
     size = WIDTH // HEADS
-    attention = {"width": WIDTH, "num_heads": HEADS, "residual": False}
-    plain = SelfAttention(**attention, temperature=None).double()
-    view = ViewAttention(**attention, temperature=math.sqrt((size + 3) / size), view_scale=0.0).double()
+    attention = tiny_models.attention
+    plain = SelfAttention(**attention()).double()
+    warm = attention(temperature=math.sqrt((size + 3) / size))
+    view = ViewAttention(**warm, view_scale=0.0).double()
     view.parts.load_state_dict(plain.parts.state_dict(), strict=False)
     features, dirs, sources, valid = inputs(4)
     torch.testing.assert_close(
         view(features, dirs, sources, valid), plain(features, dirs, sources, valid), atol=1e-8, rtol=0
     )
-    bare = ViewAttention(**attention, temperature=None, view_scale=0.0).double()
+    bare = ViewAttention(**attention(), view_scale=0.0).double()
     bare.parts.load_state_dict(plain.parts.state_dict())
     logits = bare.logits(features, dirs, sources)
     queries = safe_normalize(plain.parts.split(plain.parts.queries(features)))
@@ -158,9 +158,7 @@ def test_without_view_scale_it_is_self_attention():
 
 def test_directions_are_signed_and_opposite_views_differ():
     """Features alike, the view that looks along the query wins; turned round, the other one does."""
-    combine = ViewAttention(
-        width=WIDTH, num_heads=HEADS, residual=False, temperature=None, view_scale=3.0
-    ).double()
+    combine = ViewAttention(**tiny_models.attention(), view_scale=3.0).double()
     features = torch.ones(1, 2, WIDTH, dtype=torch.float64)
     ahead = torch.tensor(((0.0, 1.0, 0.0),), dtype=torch.float64)
     sources = torch.stack((ahead, -ahead), dim=1)
@@ -184,7 +182,7 @@ def test_rows_sum_to_one_and_averaging_weights_first_changes_nothing(name):
 
 
 def test_the_residual_form_adds_the_mean_and_normalises():
-    combine = SelfAttention(width=WIDTH, num_heads=HEADS, residual=True, temperature=2.0).double()
+    combine = SelfAttention(**tiny_models.attention(residual=True, temperature=2.0)).double()
     features, dirs, sources, valid = inputs(3)
     found = combine(features, dirs, sources, valid)
     torch.testing.assert_close(found.mean(-1), torch.zeros(POINTS, dtype=torch.float64), atol=1e-12, rtol=0)
@@ -217,3 +215,27 @@ def test_gradcheck(name):
     assert torch.autograd.gradcheck(
         lambda *x: combine(*x, valid[:2]), (features[:2].detach().requires_grad_(), dirs[:2], sources[:2])
     )
+
+
+@pytest.mark.parametrize("name", ["sa", "view_mha"])
+def test_attention_may_be_narrower_than_the_network(name):
+    """Queries, keys and values of 4 numbers in all; a linear layer brings them back to D."""
+    kind = {"sa": SelfAttention, "view_mha": partial(ViewAttention, view_scale=1.0)}[name]
+    features, dirs, sources, valid = inputs(3)
+    narrow = kind(**tiny_models.attention(attention_width=4)).double()
+    assert narrow.parts.values.out_features == 4 and narrow.parts.norm is None
+    assert narrow(features, dirs, sources, valid).shape == (POINTS, WIDTH)
+    plain = kind(**tiny_models.attention()).double()
+    same = kind(**tiny_models.attention(attention_width=WIDTH)).double()
+    same.load_state_dict(plain.state_dict())  # the plain form has no further weights
+    assert torch.equal(same(features, dirs, sources, valid), plain(features, dirs, sources, valid))
+
+
+def test_the_residual_without_its_norm_is_the_sum():
+    plain = SelfAttention(**tiny_models.attention()).double()
+    bare = SelfAttention(**tiny_models.attention(residual=True, norm=False)).double()
+    bare.load_state_dict(plain.state_dict(), strict=False)
+    features, dirs, sources, valid = inputs(3)
+    mean = tiny_models.combinator("mean")(features, dirs, sources, valid)
+    expected = mean + bare.parts.output(plain(features, dirs, sources, valid))
+    torch.testing.assert_close(bare(features, dirs, sources, valid), expected)

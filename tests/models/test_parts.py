@@ -7,6 +7,7 @@ import torch
 
 import helpers
 import tiny_models
+from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import mirror_cameras
 from charnerf.geometry.safe import safe_normalize
 from charnerf.models.features.base import ViewReadings
@@ -17,6 +18,7 @@ from charnerf.models.heads.radiance import RadianceHead
 from charnerf.models.inputs import PointInputs
 from charnerf.models.mlp import residual_blocks
 from charnerf.models.stages import encode_directions
+from charnerf.models.views.first import FirstViews
 from charnerf.models.views.mirrored import MirroredSide
 from charnerf.models.views.turnaround import Turnaround
 from charnerf.types import SourceViews
@@ -85,7 +87,7 @@ def test_heads_answer_colours_and_pass_gradcheck(head):
 
 
 @pytest.mark.parametrize("combining", tiny_models.COMBINATORS)
-@pytest.mark.parametrize("density", ["view_free", "view_dependent"])
+@pytest.mark.parametrize("density", tiny_models.DENSITIES)
 @pytest.mark.parametrize("head", ["blend", "radiance"])
 def test_what_sees_directions(combining, density, head):
     """view_free: the density is one number a point and only the colour turns with the query; else both do."""
@@ -97,7 +99,7 @@ def test_what_sees_directions(combining, density, head):
         other = field(replace(inputs, view_dirs=safe_normalize(torch.randn(9, 3, dtype=torch.float64))))
     assert torch.equal(one.densities, other.densities) != field.density.sees_directions
     assert (one.rgb - other.rgb).abs().amax() > 1e-3
-    assert (one.densities >= 0).all() and field.density.sees_directions == (density == "view_dependent")
+    assert (one.densities >= 0).all() and field.density.sees_directions == (density != "view_free")
 
 
 @pytest.mark.parametrize("num_views", range(1, 9))
@@ -178,6 +180,22 @@ def test_only_sides_that_are_there_are_mirrored():
     assert MirroredSide()(absent).images.shape[1] == 3
     camera = mirror_cameras(views.cameras[0, 1])
     assert torch.equal(camera.world_from_camera, used.cameras.world_from_camera[0, 3])
+
+
+def test_the_first_views_carve_a_wider_hull():
+    views = helpers.source_views(helpers.person())
+    assert torch.equal(FirstViews(count=1)(views).images, views.images[:, :1])
+    assert FirstViews(count=5)(views).present.shape == (1, 3)
+    shares = []
+    for count in (1, 2, 3):
+        model = tiny_models.tiny_model(features="image")
+        model.views = FirstViews(count=count)
+        encoded = model.encode(views)
+        assert encoded.feature_maps.shape[1] == count and encoded.hull is not None
+        shares.append(float(encoded.hull.occupancy.float().mean()))
+    assert shares[0] > shares[1] >= shares[2]
+    with pytest.raises(ConfigError, match="found 0, expected at least 1"):
+        FirstViews(count=0)
 
 
 def test_in_a_batch_only_the_characters_own_sides_are_mirrored():

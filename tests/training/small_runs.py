@@ -73,6 +73,7 @@ def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> Sma
         renderer=training_renderer(cfg),
         eval_renderer=build_renderer(cfg),
         losses=losses,
+        surface_dirs=build_part(cfg.surface_dirs),
         optimizer=build_part(cfg.optimizer),
         final_rate=cfg.sampling.final_rate,
         position=clock.position,

@@ -17,7 +17,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from charnerf.geometry.cameras import directions_to_points, project
-from charnerf.geometry.encoding import positional_encoding
 from charnerf.geometry.hull import hull_contains
 from charnerf.geometry.rays import box_interval, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, importance_t_vals, merge_t_vals, stratified_t_vals
@@ -126,8 +125,8 @@ class PixelNeRFLike:
             mirrored=maps.views.mirrored.to(points.dtype),
         )
         network = self.network
-        encoded = positional_encoding(
-            (points - network.box_centre) / network.box_half_extent, network.num_frequencies
+        encoded = field.single_view.locate(
+            (points - network.box_centre) / network.box_half_extent, cameras.world_from_camera[:, :3, :3]
         )
         return field(
             PointInputs(

@@ -10,9 +10,17 @@ from charnerf.schedule import Phase, PhaseSchedule
 Rule = Callable[..., Iterator[tuple[str, str]]]
 
 
-def _heads_divide_width(heads: int, width: int) -> Iterator[tuple[str, str]]:
-    if heads < 1 or width % heads:
-        yield "combinator.num_heads", f"found {heads}, expected a divisor of model.width = {width}."
+def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[tuple[str, str]]:
+    wide, name = (width, "model.width") if inner is None else (inner, "combinator.attention_width")
+    if wide < 1:
+        yield name, f"found {wide}, expected at least 1."
+    elif heads < 1 or wide % heads:
+        yield "combinator.num_heads", f"found {heads}, expected a divisor of {name} = {wide}."
+
+
+def _rate_is_positive(rate: float) -> Iterator[tuple[str, str]]:
+    if not rate > 0:
+        yield "combinator.rate", f"found {rate}, expected more than 0."
 
 
 def _something_ends_the_run(steps: int | None, seconds: float | None) -> Iterator[tuple[str, str]]:
@@ -61,7 +69,8 @@ def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
 
 
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
-    (("combinator.num_heads", "model.width"), _heads_divide_width),
+    (("combinator.num_heads", "model.width", "combinator.attention_width"), _heads_divide_width),
+    (("combinator.rate",), _rate_is_positive),
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss.weights",), _some_term_counts),

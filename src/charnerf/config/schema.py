@@ -29,6 +29,7 @@ class Scale:
     num_coarse: Count
     train_num_coarse: Count
     num_fine: CountOrZero
+    num_guided: CountOrZero
     phase_rays: list[Count]
     phase_surface_points: list[CountOrZero]
     space_points: CountOrZero
@@ -59,6 +60,7 @@ class Sampling:
     val_characters: Count | None
     val_views: Count
     num_validations: Count
+    surface_delta: Annotated[float, Above(0)] | None
     memory_mib: Annotated[float, Above(0)]
     final_rate: Annotated[float, AtLeast(0)]
     gradient_clip: Annotated[float, Above(0)] | None
@@ -86,6 +88,7 @@ class ModelSettings:
     activation: _part("charnerf.models.activations")  # type: ignore[valid-type]
 
 
+F1_GIVEN = ("width", "num_frequencies", "num_extras", "num_blocks")
 TRAINER_GIVEN = (
     "callbacks",
     "logger",
@@ -111,6 +114,7 @@ class RunConfig:
     scale: Scale
     budget: Budget
     encoder: _part("charnerf.models.encoders", given=["in_channels"])  # type: ignore[valid-type]
+    single_view: _part("charnerf.models.single_view", given=F1_GIVEN)  # type: ignore[valid-type]
     combinator: _part("charnerf.models.combinators", given=["width"])  # type: ignore[valid-type]
     head: _part("charnerf.models.heads", given=["width"])  # type: ignore[valid-type]
     density: _part("charnerf.models.density", given=["width"])  # type: ignore[valid-type]
@@ -120,6 +124,7 @@ class RunConfig:
     renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
     sampling: Sampling
     averaging: Averaging
+    surface_dirs: _part("charnerf.losses")  # type: ignore[valid-type]
     surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
     augmentation: _part("charnerf.data.augmentation", given=["used_views"])  # type: ignore[valid-type]
     loss: _part("charnerf.losses")  # type: ignore[valid-type]
@@ -129,9 +134,13 @@ class RunConfig:
     trainer: _part("lightning", given=TRAINER_GIVEN)  # type: ignore[valid-type]
 
 
+LATER_SECTIONS = {  # of a model, with what weights that do not know of them were trained with
+    "single_view": {"_target_": "charnerf.models.single_view.world.WorldSingleView"},
+}
 MODEL_SECTIONS = (
     "model",
     "encoder",
+    "single_view",
     "combinator",
     "head",
     "density",

@@ -17,6 +17,7 @@ from charnerf.errors import DataError
 from charnerf.types import Cameras, SourceViews
 
 SOURCE_ORDER = ("front", "side", "back")
+DEPTH_FOLDER = "depth"
 _PARTIAL = ".partial-"
 
 
@@ -60,7 +61,10 @@ class Character:
             DataError: If the character has no depth files, or one is unreadable or of another size.
         """
         if not self.depth_files:
-            raise DataError(f"{self.folder}: has no depth pictures; capture the character with depth.")
+            raise DataError(
+                f"{self.folder}: has no depth pictures, expected them because something reads depth; capture the character"
+                " again by `charnerf capture --depth`, or set loss.weights.depth=0."
+            )
         size = (self.cameras.width, self.cameras.height)
         return torch.stack([_read_depth(self.depth_files[index], size) for index in indices])
 
@@ -237,8 +241,8 @@ def _write_pictures(folder: Path, pictures: CharacterPictures) -> None:
         np.savetxt(folder / f"poses/{index:03d}.txt", pose, fmt="%.9g")
     depth_names: list[str] = []
     if pictures.depths is not None:
-        (folder / "depth").mkdir()
-        depth_names = [f"depth/{index:03d}.png" for index in range(len(pictures.depths))]
+        (folder / DEPTH_FOLDER).mkdir()
+        depth_names = [f"{DEPTH_FOLDER}/{index:03d}.png" for index in range(len(pictures.depths))]
         for name, depth in zip(depth_names, pictures.depths, strict=True):
             Image.fromarray(depth).save(folder / name)
     text = transforms_text(pictures.cameras, image_names, depth_names, pictures.source_cameras, source_files)

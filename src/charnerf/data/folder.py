@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import final
 
+from charnerf.data.characters import DEPTH_FOLDER
 from charnerf.data.layout import read_dataset
+from charnerf.errors import DataError
 
 
 @final
@@ -17,11 +19,20 @@ class FolderData:
     def __init__(self, *, root: str) -> None:
         self.root = Path(root)
 
-    def prepare(self) -> Path:
+    def prepare(self, *, depth: bool = False) -> Path:
         """Check that it is a data set and return its folder.
 
+        Args:
+            depth: Whether a loss reads captured depth; each training character is asked for its own when it is opened.
+
         Raises:
-            DataError: If dataset.json is missing or wrong.
+            DataError: If dataset.json is missing or wrong, or no character has depth pictures though a loss reads them.
         """
-        read_dataset(self.root)
+        info = read_dataset(self.root)
+        names = [name for split in info.splits.values() for name in split]
+        if depth and not any((self.root / name / DEPTH_FOLDER).is_dir() for name in names):
+            raise DataError(
+                f"{self.root}: no character has depth pictures, expected them because loss.weights.depth is above 0;"
+                " capture the characters again by `charnerf capture --depth`, or set loss.weights.depth=0."
+            )
         return self.root

@@ -8,7 +8,6 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.errors import ShapeError
-from charnerf.geometry.encoding import positional_encoding
 from charnerf.geometry.hull import build_hull
 from charnerf.geometry.occupied import coarse_occupancy
 from charnerf.models.encoders.base import AbstractEncoder
@@ -49,7 +48,6 @@ class CharNeRF(nn.Module):
         features: Further inputs of f1.
         coarse: The field of the coarse pass.
         fine: The field of the fine pass, or None where the configuration has none.
-        num_frequencies: nu of eq. 1.
         box_centre: Centre of the space looked at, m, 3 numbers.
         box_half_extent: Half of its side, m; coordinates are scaled by it before eq. 1, so that they stay
             in (-1, 1).
@@ -68,7 +66,6 @@ class CharNeRF(nn.Module):
         features: AbstractFeatures,
         coarse: Field,
         fine: Field | None,
-        num_frequencies: int,
         box_centre: list[float],
         box_half_extent: float,
         hull: bool,
@@ -79,7 +76,6 @@ class CharNeRF(nn.Module):
         self.features = features
         self.coarse = coarse
         self.fine = fine
-        self.num_frequencies = num_frequencies
         self.box_half_extent = float(box_half_extent)
         self.register_buffer("box_centre", torch.tensor(box_centre, dtype=torch.float32), persistent=False)
         self.has_hull = hull
@@ -182,8 +178,9 @@ class CharNeRF(nn.Module):
             source_rgb=sight.rgb,
             visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
             valid=sight.valid,
-            encoded_points=positional_encoding(
-                (points - self.box_centre) / self.box_half_extent, self.num_frequencies
+            encoded_points=self.coarse.single_view.locate(
+                (points - self.box_centre) / self.box_half_extent,
+                maps.cameras.world_from_camera[:, :3, :3],
             ),
             view_dirs=view_dirs,
             source_dirs=sight.source_dirs,

@@ -9,7 +9,8 @@ from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.inputs import PointInputs
-from charnerf.models.stages import MultiView, SingleView
+from charnerf.models.single_view.base import AbstractSingleView
+from charnerf.models.stages import MultiView
 from charnerf.types import DensityAnswer, FieldOutput, TensorRecord
 
 
@@ -18,15 +19,13 @@ class Field(nn.Module):
     """A radiance field conditioned on source views.
 
     Args:
+        single_view: f1.
         combinator: H.
         density: The wiring of the query direction.
         head: The colour head.
         activation: From raw values to densities in 1/m.
         feature_channels: F, of the encoder.
-        encoded_size: Size of the encoded point.
-        num_extras: Further inputs per view.
         width: D.
-        num_single_view_blocks: Blocks of f1.
         num_multi_view_blocks: Blocks of f2.
 
     Source: paper, Overview and Fig. network.
@@ -35,22 +34,18 @@ class Field(nn.Module):
     def __init__(
         self,
         *,
+        single_view: AbstractSingleView,
         combinator: AbstractCombinator,
         density: AbstractDensity,
         head: AbstractHead,
         activation: nn.Module,
         feature_channels: int,
-        encoded_size: int,
-        num_extras: int,
         width: int,
-        num_single_view_blocks: int,
         num_multi_view_blocks: int,
     ) -> None:
         super().__init__()
-        self.from_latents = nn.Linear(feature_channels, width)
-        self.single_view = SingleView(
-            width=width, encoded_size=encoded_size, num_extras=num_extras, num_blocks=num_single_view_blocks
-        )
+        self.from_latents = nn.Linear(feature_channels, single_view.latent_size)
+        self.single_view = single_view
         self.combinator = combinator
         self.multi_view = MultiView(width=width, num_blocks=num_multi_view_blocks)
         self.density = density

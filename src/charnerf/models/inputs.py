@@ -12,12 +12,12 @@ class PointInputs(TensorRecord):
     """Points as the source views see them.
 
     Attributes:
-        latents: (P, V, D), encoder features at the projections, already through the field's linear layer.
+        latents: (P, V, L), encoder features at the projections, already through the field's linear layer.
         extras: (P, V, E), further inputs per view (see models/features); E may be 0.
         source_rgb: (P, V, 3) in [0, 1], colour of the drawings at the projections.
         visibility: (P, V) in [0, 1], 1 on the side of the hull that faces the view, falling with depth behind it.
         valid: (P, V), bool: in front of the camera and inside the picture.
-        encoded_points: (P, C), positional encoding of the points.
+        encoded_points: (P, C) or (P, V, C), where the points lie, as f1 encodes it.
         view_dirs: (P, 3), unit query directions, or zero for "no direction".
         source_dirs: (P, V, 3), unit, from each source camera to the point.
     """

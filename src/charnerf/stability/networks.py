@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from copy import deepcopy
+from typing import Any
 
 import mpmath
 import torch
@@ -34,14 +35,14 @@ def combinators() -> dict[str, AbstractCombinator]:
     """One of each, seeded, the learned one away from its start."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
-        attention = {"width": WIDTH, "num_heads": 4, "residual": True, "temperature": 4.0}
+        plain: dict[str, Any] = {"width": WIDTH, "num_heads": 4, "attention_width": None, "rate": 1.0}
+        plain |= {"residual": False, "norm": True, "temperature": None}
+        attention = plain | {"residual": True, "temperature": 4.0}
         built: dict[str, AbstractCombinator] = {
             "mean": Mean(),
-            "sa": SelfAttention(width=WIDTH, num_heads=4, residual=False, temperature=None),
-            "view_mha": ViewAttention(
-                width=WIDTH, num_heads=4, residual=False, temperature=None, view_scale=1.0
-            ),
-            "view_mha, residual": ViewAttention(**attention, view_scale=1.0),  # type: ignore[arg-type]
+            "sa": SelfAttention(**plain),
+            "view_mha": ViewAttention(**plain, view_scale=1.0),
+            "view_mha, residual": ViewAttention(**attention, view_scale=1.0),
             "learned": LearnedWeights(width=WIDTH, hidden=8),
         }
         nn.init.normal_(built["learned"].score.weight)  # type: ignore[union-attr, arg-type]

@@ -10,14 +10,17 @@ from torch import Tensor
 
 from charnerf.data.sampler import Position, step_seed
 from charnerf.data.validation import ValidationView
+from charnerf.errors import ConfigError
 from charnerf.evaluation.metrics import psnr, psnr_foreground, ssim
+from charnerf.losses.directions import AbstractDirections
 from charnerf.losses.total import PassOutput, WeightedLosses
 from charnerf.models.charnerf import CharNeRF
-from charnerf.types import FieldFunction, RenderOutput, Scene, TrainBatch
+from charnerf.models.combinators.base import AbstractCombinator
+from charnerf.types import FieldFunction, RenderOutput, TrainBatch
 from charnerf.volume.compositing import alphas_from_densities
 from charnerf.volume.renderers.base import AbstractRenderer
 
-OptimizerOf = Callable[[Iterable[torch.nn.Parameter]], torch.optim.Optimizer]
+OptimizerOf = Callable[[Iterable[torch.nn.Parameter] | list[dict[str, Any]]], torch.optim.Optimizer]
 WARM_UP = 0.01  # share of the run in which the learning rate rises
 SPACE_DELTA = 0.02  # m: thickness at which a labelled point inside shall be opaque
 
@@ -30,6 +33,7 @@ class TrainingModule(L.LightningModule):
         renderer: Renders the training rays.
         eval_renderer: Renders validation pictures.
         losses: Terms and weights.
+        surface_dirs: Along which directions surface points are looked at.
         optimizer: Makes the optimiser of parameters.
         final_rate: Learning rate at the end of the run over that at the start (cosine between them).
         position: Where the run stands.
@@ -44,6 +48,7 @@ class TrainingModule(L.LightningModule):
         renderer: AbstractRenderer,
         eval_renderer: AbstractRenderer,
         losses: WeightedLosses,
+        surface_dirs: AbstractDirections,
         optimizer: OptimizerOf,
         final_rate: float,
         position: Position,
@@ -55,6 +60,7 @@ class TrainingModule(L.LightningModule):
         self.renderer = renderer
         self.eval_renderer = eval_renderer
         self.losses = losses
+        self.surface_dirs = surface_dirs
         self.make_optimizer = optimizer
         self.final_rate = final_rate
         self.position = position
@@ -68,10 +74,11 @@ class TrainingModule(L.LightningModule):
         encoded = self.model.encode(batch.views, batch.hull)
         scenes = [self.model.scene(encoded, index) for index in range(len(batch.names))]
         renderings = [self.renderer.render(scene, batch.rays[b], generator) for b, scene in enumerate(scenes)]
-        passes = [self._pass(scenes, [r.finest for r in renderings], [s.field for s in scenes], batch)]
+        dirs = self._surface_dirs(batch, generator)
+        passes = [self._pass([r.finest for r in renderings], [s.field for s in scenes], dirs, batch)]
         if renderings[0].coarse is not None:
             coarse = [r.coarse for r in renderings if r.coarse is not None]
-            passes.append(self._pass(scenes, coarse, [s.coarse for s in scenes], batch))
+            passes.append(self._pass(coarse, [s.coarse for s in scenes], dirs, batch))
         loss, terms = self.losses(passes, batch)
         self.last_opacity = _seen_opacity(passes[0].rays.opacity.detach(), batch.alpha)
         now = self.position()
@@ -89,15 +96,26 @@ class TrainingModule(L.LightningModule):
         self.log_dict(logged, batch_size=1)
         return loss
 
+    def _surface_dirs(self, batch: TrainBatch, generator: torch.Generator) -> list[Tensor]:
+        """Query directions (P, 3) of each character's surface points; none without points."""
+        if batch.surface is None:
+            return []
+        pairs = zip(batch.surface.points, batch.rays.origins, strict=True)
+        return [self.surface_dirs(points, origins, generator) for points, origins in pairs]
+
     def _pass(
-        self, scenes: list[Scene], outputs: list[RenderOutput], fields: list[FieldFunction], batch: TrainBatch
+        self,
+        outputs: list[RenderOutput],
+        fields: list[FieldFunction],
+        surface_dirs: list[Tensor],
+        batch: TrainBatch,
     ) -> PassOutput:
         """What one of the two passes answers to rays and points."""
         active = self.losses.active(batch.loss_weights)
         surface_rgb = surface_alpha = space_alpha = None
         if batch.surface is not None and not active.keys().isdisjoint({"surface_rgb", "surface_alpha"}):
             answers = [
-                field(p, torch.zeros_like(p)) for field, p in zip(fields, batch.surface.points, strict=True)
+                field(p, d) for field, p, d in zip(fields, batch.surface.points, surface_dirs, strict=True)
             ]
             surface_rgb = torch.stack([answer.rgb for answer in answers])
             densities = torch.stack([answer.densities for answer in answers])
@@ -132,8 +150,22 @@ class TrainingModule(L.LightningModule):
         self.log_dict(measured, batch_size=1, sync_dist=True)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        """The optimiser; its rate is set before every step."""
-        return self.make_optimizer(self.model.parameters())
+        """The optimiser; its rate is set before every step. A combinator with a rate of its own is a group of its own."""
+        combinators = [one for one in self.model.modules() if isinstance(one, AbstractCombinator)]
+        rate = combinators[0].rate
+        own = {id(p): p for one in combinators for p in one.parameters()}
+        if rate == 1.0 or not own:
+            return self.make_optimizer(self.model.parameters())
+        others = [p for p in self.model.parameters() if id(p) not in own]
+        try:
+            optimizer = self.make_optimizer([{"params": others}, {"params": list(own.values())}])
+        except (AttributeError, TypeError) as error:
+            raise ConfigError(
+                f"combinator.rate: found {rate}, but this optimizer takes no groups of parameters ({error}); expected 1,"
+                " or an optimizer of torch.optim."
+            ) from error
+        optimizer.param_groups[1]["lr"] *= rate
+        return optimizer
 
     def on_train_start(self) -> None:
         """Remember the rate that the config asks for; a resumed optimiser has it already."""

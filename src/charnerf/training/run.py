@@ -4,6 +4,7 @@ import ctypes
 import logging
 import warnings
 from collections.abc import Callable
+from datetime import timedelta
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ from charnerf.training.monitor import BudgetBar, CurveWriter, PictureLogger
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
+START_FILE = "start.txt"  # where the weights of a run began, if that was not random
+CHECKPOINT_EVERY = timedelta(minutes=5)  # at least; validations write checkpoints too
 SURFACE_TERMS = ("surface_rgb", "surface_alpha")
 HYPER_METRICS = ("val/psnr", "val/psnr_foreground", "val/ssim")  # columns beside the hyper-parameters
 
@@ -51,16 +54,17 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
     save_config(folder, cfg)
-    root = build_part(cfg.data).prepare()
+    losses: WeightedLosses = build_part(cfg.loss)
+    root = build_part(cfg.data).prepare(depth=reads(cfg, losses, "depth"))
     model = build_model(cfg)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
-    losses: WeightedLosses = build_part(cfg.loss)
     renderer = build_renderer(cfg)
     module = TrainingModule(
         model=model,
         renderer=training_renderer(cfg),
         eval_renderer=renderer,
         losses=losses,
+        surface_dirs=build_part(cfg.surface_dirs),
         optimizer=build_part(cfg.optimizer),
         final_rate=cfg.sampling.final_rate,
         position=clock.position,
@@ -68,9 +72,13 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         seed=cfg.seed,
     )
     data = build_data(cfg, root, model, clock, losses)
+    start = model.encoder.begin() if checkpoint is None else None
     trainer = build_trainer(cfg, folder, clock)
     if trainer.is_global_zero:
         log_hyperparameters(trainer, cfg, model)
+        if start is not None:
+            log.warning(start)
+            (folder / START_FILE).write_text(f"{start}\n", encoding="utf-8")
     with warnings.catch_warnings():
         # the loaders are fed from memory, one request at a time: more workers would not help
         warnings.filterwarnings("ignore", message=".*does not have many workers.*")
@@ -166,6 +174,12 @@ def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
         ),
         # of its own: Lightning's `save_last` writes only where the best improved
         ModelCheckpoint(dirpath=folder / "checkpoints", filename="last", enable_version_counter=False),
+        ModelCheckpoint(  # the same file between two validations that are far apart
+            dirpath=folder / "checkpoints",
+            filename="last",
+            train_time_interval=CHECKPOINT_EVERY,
+            enable_version_counter=False,
+        ),
     ]
     return build_part(
         cfg.trainer,
@@ -193,8 +207,11 @@ def training_renderer(cfg: DictConfig) -> AbstractRenderer:
 def surface_delta(cfg: DictConfig) -> float:
     """Interval length of a surface point, m.
 
-    Source: paper, Mix of 2d ray sampling and 3d surface sampling: (z_far - z_near) / (n_coarse + n_fine), real depths.
+    Source: paper, Mix of 2d ray sampling and 3d surface sampling: (z_far - z_near) / (n_coarse + n_fine), real depths;
+    `sampling.surface_delta` where that is set.
     """
+    if cfg.sampling.surface_delta is not None:
+        return float(cfg.sampling.surface_delta)
     return 2.0 * cfg.model.box_half_extent / (cfg.scale.train_num_coarse + cfg.renderer.num_fine)
 
 

@@ -52,6 +52,7 @@ def generate_dataset(
     *,
     views: int = 48,
     size: int = 128,
+    depth: bool = False,
     processes: int | None = None,
 ) -> DatasetInfo:
     """Write embedded characters as a data set; those that are there already are kept.
@@ -64,6 +65,7 @@ def generate_dataset(
         seed: Seed of the whole set; splits never share a character.
         views: Target pictures a character.
         size: Side of every picture, pixels.
+        depth: Whether depth pictures are written too.
         processes: Worker processes; None for one a core.
 
     Returns:
@@ -75,7 +77,7 @@ def generate_dataset(
     """
     counts = {"train": train, "val": val, "test": test}
     _check_numbers({**counts, "seed": seed}, views=views, size=size)
-    root, options = Path(root), CaptureOptions(views=views, size=size)
+    root, options = Path(root), CaptureOptions(views=views, size=size, depth=depth)
     facts = {
         **made_by(options),
         "generator": "procedural",
@@ -133,28 +135,35 @@ class ProceduralData:
     @property
     def root(self) -> Path:
         """Where the data set is, or will be: its name tells every setting and the generator's version."""
-        text = json.dumps({**self._settings, "generator_version": GENERATOR_VERSION}, sort_keys=True)
+        return self._root(self._settings)
+
+    def _root(self, settings: dict[str, int]) -> Path:
+        text = json.dumps({**settings, "generator_version": GENERATOR_VERSION}, sort_keys=True)
         return (
             self._cache / f"procedural-v{GENERATOR_VERSION}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
         )
 
-    def prepare(self) -> Path:
+    def prepare(self, *, depth: bool = False) -> Path:
         """Generate what is missing; the data set's folder.
+
+        Args:
+            depth: Whether a loss reads captured depth: the same characters and pictures with depth, in a folder of their own.
 
         Raises:
             DataError: If the folder can not be made or holds something else.
         """
-        if not self._is_complete():
-            generate_dataset(self.root, **self._settings)
-        return self.root
+        root = self._root({**self._settings, "depth": True} if depth else self._settings)
+        if not self._is_complete(root):
+            generate_dataset(root, **self._settings, depth=depth)
+        return root
 
-    def _is_complete(self) -> bool:
-        if not (self.root / DATASET_FILE).is_file():
+    def _is_complete(self, root: Path) -> bool:
+        if not (root / DATASET_FILE).is_file():
             return False
-        splits = read_dataset(self.root).splits
+        splits = read_dataset(root).splits
         return all(
             len(splits.get(split, ())) == self._settings[split]
-            and all((self.root / name).is_dir() for name in splits.get(split, ()))
+            and all((root / name).is_dir() for name in splits.get(split, ()))
             for split in SPLITS
         )
 

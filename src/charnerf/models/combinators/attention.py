@@ -12,26 +12,40 @@ class AttentionParts(nn.Module):
     """Projections and the softmax over views; logits come from the combinator.
 
     Args:
-        width: D, a multiple of num_heads.
+        width: D.
         num_heads: K.
-        residual: Add the features to the attended values and normalise (off in the paper's plain form).
+        attention_width: Of queries, keys and values, all heads together, a multiple of num_heads; D if None.
+        residual: Add the mean of the features to the projected attended values (off in the paper's plain form).
+        norm: LayerNorm of that sum; read only with `residual`.
         temperature: Start of a learned factor on the feature logits (1 and fixed in the plain form: None).
     """
 
-    def __init__(self, *, width: int, num_heads: int, residual: bool, temperature: float | None) -> None:
+    def __init__(
+        self,
+        *,
+        width: int,
+        num_heads: int,
+        attention_width: int | None,
+        residual: bool,
+        norm: bool,
+        temperature: float | None,
+    ) -> None:
         super().__init__()
+        inner = attention_width or width
         self.num_heads = num_heads
-        self.queries = nn.Linear(width, width, bias=False)
-        self.keys = nn.Linear(width, width, bias=False)
-        self.values = nn.Linear(width, width, bias=False)
-        self.norm: nn.Module | None = nn.LayerNorm(width) if residual else None
-        self.output: nn.Module | None = nn.Linear(width, width) if residual else None
+        self.head_size = inner // num_heads
+        self.is_residual = residual
+        self.queries = nn.Linear(width, inner, bias=False)
+        self.keys = nn.Linear(width, inner, bias=False)
+        self.values = nn.Linear(width, inner, bias=False)
+        self.norm: nn.Module | None = nn.LayerNorm(width) if residual and norm else None
+        self.output: nn.Module | None = nn.Linear(inner, width) if residual or inner != width else None
         self.log_temperature = (
             None if temperature is None else nn.Parameter(torch.tensor(math.log(temperature)))
         )
 
     def split(self, x: Tensor) -> Tensor:
-        """Split (P, V, D) into heads, (P, V, K, D / K)."""
+        """Split (P, V, A) into heads, (P, V, K, A / K)."""
         return x.unflatten(-1, (self.num_heads, -1))
 
     def feature_logits(self, queries: Tensor, keys: Tensor) -> Tensor:
@@ -49,8 +63,9 @@ class AttentionParts(nn.Module):
         row_weights = view_weights(valid, weights.dtype)
         averaged = (weights * row_weights[:, None, :, None]).sum(2)  # (P, K, V key)
         values = self.split(self.values(view_features))
-        fused = (averaged.transpose(1, 2)[..., None] * values).sum(1).flatten(-2)  # (P, D)
-        if self.norm is None or self.output is None:
-            return fused
-        mean = (view_features * row_weights[..., None]).sum(1)
-        return self.norm(mean + self.output(fused))
+        fused = (averaged.transpose(1, 2)[..., None] * values).sum(1).flatten(-2)  # (P, A)
+        if self.output is not None:
+            fused = self.output(fused)
+        if self.is_residual:
+            fused = fused + (view_features * row_weights[..., None]).sum(1)
+        return fused if self.norm is None else self.norm(fused)

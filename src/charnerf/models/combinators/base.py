@@ -11,9 +11,11 @@ class AbstractCombinator(nn.Module, ABC):
 
     Attributes:
         sees_query: Whether the result depends on the query direction.
+        rate: Learning rate of its weights over that of the others.
     """
 
     sees_query: bool
+    rate: float = 1.0
 
     @abstractmethod
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:

@@ -28,11 +28,14 @@ class ViewAttention(AbstractCombinator):
     that its logit is exactly a feature part plus a view part. Directions are signed: front and back differ.
 
     Args:
-        width: D, a multiple of num_heads.
+        width: D.
         num_heads: K.
         residual: See AttentionParts.
         temperature: See AttentionParts.
         view_scale: Start of the learned factor s; 0 would be a stationary point.
+        attention_width: See AttentionParts.
+        norm: See AttentionParts.
+        rate: Learning rate of these weights over that of the others.
 
     Source: paper, View direction attended multi-head self attention; what it leaves open is chosen in the notes: the n rows are
     averaged, s starts at 1.
@@ -41,14 +44,29 @@ class ViewAttention(AbstractCombinator):
     sees_query = True
 
     def __init__(
-        self, *, width: int, num_heads: int, residual: bool, temperature: float | None, view_scale: float
+        self,
+        *,
+        width: int,
+        num_heads: int,
+        residual: bool,
+        temperature: float | None,
+        view_scale: float,
+        attention_width: int | None,
+        norm: bool,
+        rate: float,
     ) -> None:
         super().__init__()
         self.parts = AttentionParts(
-            width=width, num_heads=num_heads, residual=residual, temperature=temperature
+            width=width,
+            num_heads=num_heads,
+            attention_width=attention_width,
+            residual=residual,
+            norm=norm,
+            temperature=temperature,
         )
+        self.rate = rate
         self.view_scale = nn.Parameter(torch.tensor(float(view_scale)))
-        self.scale = 1.0 / math.sqrt(width // num_heads + 3)
+        self.scale = 1.0 / math.sqrt(self.parts.head_size + 3)
 
     def logits(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor) -> AttentionLogits:
         """The two parts of the scaled dot products (the paper's analysis plots their means)."""

@@ -7,7 +7,8 @@ from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.inputs import PointInputs
-from charnerf.models.stages import MultiView, SingleView
+from charnerf.models.single_view.base import AbstractSingleView
+from charnerf.models.stages import MultiView
 from charnerf.types import TensorRecord
 
 
@@ -33,7 +34,7 @@ class AbstractDensity(nn.Module, ABC):
     def trunk(
         self,
         inputs: PointInputs,
-        single_view: SingleView,
+        single_view: AbstractSingleView,
         combinator: AbstractCombinator,
         multi_view: MultiView,
     ) -> TrunkOutput:
@@ -46,7 +47,7 @@ class AbstractDensity(nn.Module, ABC):
     def forward(
         self,
         inputs: PointInputs,
-        single_view: SingleView,
+        single_view: AbstractSingleView,
         combinator: AbstractCombinator,
         multi_view: MultiView,
     ) -> TrunkOutput:

@@ -7,7 +7,8 @@ from torch import Tensor
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
 from charnerf.models.inputs import PointInputs
-from charnerf.models.stages import MultiView, SingleView
+from charnerf.models.single_view.base import AbstractSingleView
+from charnerf.models.stages import MultiView
 
 
 @final
@@ -26,7 +27,7 @@ class ViewDependentDensity(AbstractDensity):
     def trunk(
         self,
         inputs: PointInputs,
-        single_view: SingleView,
+        single_view: AbstractSingleView,
         combinator: AbstractCombinator,
         multi_view: MultiView,
     ) -> TrunkOutput:

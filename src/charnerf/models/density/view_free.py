@@ -9,7 +9,8 @@ from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
 from charnerf.models.inputs import PointInputs
 from charnerf.models.mlp import ResidualBlock
-from charnerf.models.stages import DIRECTION_FREQUENCIES, MultiView, SingleView, encode_directions
+from charnerf.models.single_view.base import AbstractSingleView
+from charnerf.models.stages import DIRECTION_FREQUENCIES, MultiView, encode_directions
 
 
 @final
@@ -30,7 +31,7 @@ class ViewFreeDensity(AbstractDensity):
     def trunk(
         self,
         inputs: PointInputs,
-        single_view: SingleView,
+        single_view: AbstractSingleView,
         combinator: AbstractCombinator,
         multi_view: MultiView,
     ) -> TrunkOutput:

@@ -19,3 +19,11 @@ class AbstractEncoder(nn.Module, ABC):
     @abstractmethod
     def forward(self, images: Tensor) -> Tensor:
         """Map images (N, C, H, W) to feature maps (N, F, h, w)."""
+
+    def begin(self) -> str | None:
+        """Take weights from elsewhere, where this encoder has such; called before a training from the start.
+
+        Returns:
+            What to tell about where the training begins, None where there is nothing to tell.
+        """
+        return None

@@ -1,0 +1,62 @@
+"""f1 of pixelNeRF: coordinates turned into each source camera; the encoder's features enter before every block."""
+
+import math
+from typing import final
+
+import torch
+from torch import Tensor, nn
+
+from charnerf.geometry.encoding import positional_encoding
+from charnerf.models.inputs import PointInputs
+from charnerf.models.mlp import residual_blocks
+from charnerf.models.single_view.base import AbstractSingleView
+
+ROTATION = 9  # numbers that carry the camera's axes beside a point's code
+
+
+@final
+class CameraSingleView(AbstractSingleView):
+    """Point and raw direction in the axes of each source camera, and a linear map of the features for every block.
+
+    The point is turned, not moved, into the camera's axes, and encoded with the point itself included: sines and cosines of
+    factor 2^k x, k = 0 .. octaves - 1.
+
+    Args:
+        width: D.
+        num_extras: Further inputs per view.
+        num_blocks: Residual blocks.
+        octaves: Of the point's code.
+        factor: Lowest frequency, radians a half-extent of the box.
+
+    Source: pixelNeRF (Yu 2021): six octaves, factor 1.5, three blocks before the views' mean.
+    """
+
+    def __init__(self, *, width: int, num_extras: int, num_blocks: int, octaves: int, factor: float) -> None:
+        super().__init__()
+        self.octaves = octaves
+        self.factor = factor
+        self.latent_size = width * max(1, num_blocks)
+        self.from_points = nn.Linear(3 + 2 * 3 * octaves + 3, width)
+        self.from_extras = nn.Linear(num_extras, width, bias=False) if num_extras else None
+        self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
+
+    def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
+        """Encode points (P, 3) in each camera's axes, with those axes, as (P, V, C + 9)."""
+        turned = (points[:, None, :, None] * rotations).sum(-2)  # transposed: world to camera
+        code = positional_encoding(turned * (self.factor / math.pi), self.octaves)
+        axes = rotations.reshape(1, -1, ROTATION).expand(len(points), -1, -1)
+        return torch.cat((turned, code, axes), dim=-1)
+
+    def forward(self, inputs: PointInputs, view_dirs: Tensor) -> Tensor:
+        """V^(i) (P, V, D)."""
+        code, axes = inputs.encoded_points[..., :-ROTATION], inputs.encoded_points[..., -ROTATION:]
+        directions = (view_dirs[:, None, :, None] * axes.unflatten(-1, (3, 3))).sum(-2)
+        x = self.from_points(torch.cat((code, directions), dim=-1))
+        if self.from_extras is not None:
+            x = x + self.from_extras(inputs.extras)
+        latents = inputs.latents.unflatten(-1, (-1, x.shape[-1])).unbind(-2)
+        if len(self.blocks) == 0:
+            return x + latents[0]
+        for block, latent in zip(self.blocks, latents, strict=True):
+            x = block(x + latent)
+        return x

@@ -1,0 +1,49 @@
+"""f1 of the paper: world coordinates by eq. 1; the encoder's features enter once."""
+
+from typing import final
+
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from charnerf.geometry.encoding import positional_encoding
+from charnerf.models.inputs import PointInputs
+from charnerf.models.mlp import residual_blocks
+from charnerf.models.single_view.base import AbstractSingleView
+from charnerf.models.stages import DIRECTION_FREQUENCIES, encode_directions
+
+
+@final
+class WorldSingleView(AbstractSingleView):
+    """Encoder features, encoded point and direction through a linear layer each, summed, then residual blocks per view.
+
+    Args:
+        width: D.
+        num_frequencies: nu of eq. 1.
+        num_extras: Further inputs per view.
+        num_blocks: Residual blocks (paper: 3).
+
+    Source: paper, Fig. network.
+    """
+
+    def __init__(self, *, width: int, num_frequencies: int, num_extras: int, num_blocks: int) -> None:
+        super().__init__()
+        self.num_frequencies = num_frequencies
+        self.latent_size = width
+        self.from_points = nn.Linear(2 * 3 * num_frequencies + 6 * DIRECTION_FREQUENCIES, width)
+        self.from_extras = nn.Linear(num_extras, width, bias=False) if num_extras else None
+        self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
+
+    def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
+        """Encode points (P, 3) by eq. 1 as (P, C)."""
+        return positional_encoding(points, self.num_frequencies)
+
+    def forward(self, inputs: PointInputs, view_dirs: Tensor) -> Tensor:
+        """V^(i) (P, V, D)."""
+        size = inputs.encoded_points.shape[-1]
+        weight = self.from_points.weight
+        # one direction for all points costs one row, not one a point
+        located = F.linear(inputs.encoded_points, weight[:, :size]) + F.linear(
+            encode_directions(view_dirs), weight[:, size:], self.from_points.bias
+        )
+        x = inputs.latents + located[:, None]
+        return self.blocks(x if self.from_extras is None else x.add_(self.from_extras(inputs.extras)))
