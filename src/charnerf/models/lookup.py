@@ -6,7 +6,8 @@ image, at a fraction of its cost on a CPU, and linear maps of the features can b
 
 import torch
 from torch import Tensor
-from torch.nn import functional as F
+
+from charnerf.models.fused import read_bags
 
 
 def bilinear_rows(pixels: Tensor, *, width: int, height: int) -> tuple[Tensor, Tensor]:
@@ -40,7 +41,7 @@ def bilinear_rows(pixels: Tensor, *, width: int, height: int) -> tuple[Tensor, T
 
 def read_rows(rows: Tensor, indices: Tensor, weights: Tensor) -> Tensor:
     """Weighted sums of rows: rows (N, C), indices and weights (Q, 4) -> (Q, C)."""
-    return F.embedding_bag(indices, rows, per_sample_weights=weights.to(rows.dtype), mode="sum")
+    return read_bags(rows, indices, weights.to(rows.dtype))
 
 
 def maps_to_rows(maps: Tensor) -> Tensor:

@@ -3,7 +3,8 @@
 from typing import final
 
 from torch import Tensor, nn
-from torch.nn import functional as F
+
+from charnerf.models.fused import residual_rows
 
 
 @final
@@ -21,7 +22,9 @@ class ResidualBlock(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Apply the block to (..., width)."""
-        return x + self.second(self.first(F.relu(x)).relu_())
+        rows = x.reshape(-1, x.shape[-1])
+        first, second = self.first, self.second
+        return residual_rows(rows, first.weight, first.bias, second.weight, second.bias).view(x.shape)
 
 
 def residual_blocks(*, width: int, num_blocks: int) -> nn.Sequential:

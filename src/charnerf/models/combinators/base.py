@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 
-import torch
 from torch import Tensor, nn
 
 
@@ -44,16 +43,3 @@ def masked_logits(logits: Tensor, valid: Tensor) -> Tensor:
     return logits.masked_fill(
         hidden.reshape(hidden.shape[0], *[1] * (logits.ndim - 2), hidden.shape[1]), float("-inf")
     )
-
-
-def weighted_sum(weights: Tensor, view_features: Tensor) -> Tensor:
-    """Sum over the views of weights (P, V) times features (P, V, D): (P, D).
-
-    View by view: with three or four views that needs fewer passes over memory than a product and a sum, and far less than a
-    batched matrix product. Unbound, because the gradient of a slice is a whole tensor of zeros.
-    """
-    first, *others = zip(view_features.unbind(1), weights.unbind(1), strict=True)
-    total = first[0] * first[1][:, None]
-    for features, weight in others:
-        total = torch.addcmul(total, features, weight[:, None])
-    return total

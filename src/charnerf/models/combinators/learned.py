@@ -5,7 +5,8 @@ from typing import final
 import torch
 from torch import Tensor, nn
 
-from charnerf.models.combinators.base import AbstractCombinator, masked_logits, weighted_sum
+from charnerf.models.combinators.base import AbstractCombinator, masked_logits
+from charnerf.models.fused import score_rows, sum_views
 
 
 @final
@@ -31,6 +32,13 @@ class LearnedWeights(AbstractCombinator):
         """Fuse (P, V, D) to (P, D)."""
         cosines = (view_dirs[:, None] * source_dirs).sum(-1, keepdim=True)
         angles = self.from_angles(torch.cat((cosines, source_dirs), dim=-1))
-        logits = self.score(self.from_features(view_features).add_(angles).relu_())[..., 0]
+        logits = score_rows(
+            view_features.reshape(-1, view_features.shape[-1]),
+            angles.reshape(-1, angles.shape[-1]),
+            self.from_features.weight,
+            self.from_features.bias,
+            self.score.weight,
+            self.score.bias,
+        ).view(valid.shape)
         weights = torch.softmax(masked_logits(logits, valid), dim=-1)
-        return weighted_sum(weights, view_features)
+        return sum_views(weights, view_features)

@@ -4,7 +4,8 @@ from typing import final
 
 from torch import Tensor
 
-from charnerf.models.combinators.base import AbstractCombinator, view_weights, weighted_sum
+from charnerf.models.combinators.base import AbstractCombinator, view_weights
+from charnerf.models.fused import sum_views
 
 
 @final
@@ -15,4 +16,4 @@ class Mean(AbstractCombinator):
 
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
         """Average (P, V, D) to (P, D)."""
-        return weighted_sum(view_weights(valid, view_features.dtype), view_features)
+        return sum_views(view_weights(valid, view_features.dtype), view_features)

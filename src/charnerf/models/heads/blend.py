@@ -7,6 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from charnerf.models.combinators.base import masked_logits
+from charnerf.models.fused import score_rows
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.inputs import PointInputs
 
@@ -34,9 +35,16 @@ class BlendHead(AbstractHead):
         """Colours (P, 3)."""
         cosines = (inputs.view_dirs[:, None] * inputs.source_dirs).sum(-1, keepdim=True)
         readings = torch.cat((cosines, inputs.visibility[..., None], inputs.source_rgb), dim=-1)
-        hidden = self.from_views(view_features) + self.from_features(features)[:, None]
-        hidden = hidden.add_(self.from_readings(readings)).relu_()
-        logits = self.score(hidden)[..., 0] + 2.0 * inputs.visibility
+        addend = self.from_readings(readings) + self.from_features(features)[:, None]
+        scores = score_rows(
+            view_features.reshape(-1, view_features.shape[-1]),
+            addend.reshape(-1, addend.shape[-1]),
+            self.from_views.weight,
+            self.from_views.bias,
+            self.score.weight,
+            self.score.bias,
+        )
+        logits = scores.view(inputs.valid.shape) + 2.0 * inputs.visibility
         weights = torch.softmax(masked_logits(logits, inputs.valid), dim=-1)
         blended = (weights[..., None] * inputs.source_rgb).sum(1)
         free = self.free(F.relu(features))

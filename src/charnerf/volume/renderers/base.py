@@ -129,7 +129,9 @@ class AbstractRenderer(ABC):
         inside = (seen.length > 0)[:, None].expand_as(t_vals)
         if scene.hull is not None:
             inside = inside & hull_contains(scene.hull, points)
-        chunk = min(chunk_size(self.memory_mib, scene.bytes_a_point), self.points_at_once)
+        chunk = chunk_size(self.memory_mib, scene.bytes_a_point)
+        if not torch.is_grad_enabled():  # each chunk would give the maps a dense gradient of its own
+            chunk = min(chunk, self.points_at_once)
         answer, evaluated = self._evaluate(field, points, dirs, inside, chunk)
         weights, _ = self.quadrature.weights(answer.densities, s_vals, self._edges(seen, s_vals))
         far = seen.t_edges[:, -1]
