@@ -50,6 +50,8 @@ def say(text: str) -> None:
 def load_model(path: Path | None, *, device: str, trust: Sequence[str], renderer: str | None = None) -> Model:
     """Load a model onto a device, with its own renderer or another one of the same settings."""
     model = runs.load(path, trusted_targets=trust).to(pick_device(device))
+    if model.note is not None:
+        say(f"{model.source}: {model.note}")
     if renderer is None:
         return model
     shared = {name: value for name, value in model.config.renderer.items() if name != "tolerance"}
@@ -212,6 +214,9 @@ def reconstruct(
     frames: int,
     size: int,
     cameras: int,
+    smooth: int,
+    symmetric: bool,
+    refine: float | None,
     height: float,
     texture: TextureKind,
     texture_size: int,
@@ -232,6 +237,9 @@ def reconstruct(
         frames=frames,
         size=size,
         num_cameras=cameras,
+        smooth=smooth,
+        symmetric=symmetric,
+        refine_seconds=refine,
         height=height,
         texture=texture,
         texture_size=texture_size,

@@ -13,6 +13,8 @@ from PIL import Image
 from tqdm import tqdm
 
 from charnerf.errors import DataError
+from charnerf.finetuning.command import refine
+from charnerf.finetuning.report import plot_curve, summary_lines
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
@@ -61,6 +63,9 @@ def reconstruct(
     frames: int = 36,
     size: int = 160,
     num_cameras: int = 8,
+    smooth: int = 0,
+    symmetric: bool = False,
+    refine_seconds: float | None = None,
     height: float = HEIGHT,
     texture: TextureKind = "drawings",
     texture_size: int = TEXTURE_SIZE,
@@ -82,6 +87,9 @@ def reconstruct(
         frames: Frames of the turntable.
         size: Side of pictures, pixels; 36 of 160 take half a minute on two cores.
         num_cameras: Cameras whose directions the density is averaged over.
+        smooth: Rounds of smoothing of the mesh.
+        symmetric: Average densities over left and right, for mesh and views.
+        refine_seconds: Time in which the multi-view blocks are adapted to the drawings first; None leaves it.
         height: Of the mesh, m.
         texture: Where the mesh's colours come from: drawings, field or vertex.
         texture_size: Texels a side.
@@ -99,6 +107,12 @@ def reconstruct(
     for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
         sys.stderr.write(f"{line}\n")
     encoded = time.perf_counter()
+    refined = None if refine_seconds is None else refine(model, hero, refine_seconds)
+    if refined is not None:
+        hero = refined.hero
+        sys.stderr.write("".join(f"{line}\n" for line in summary_lines(refined)))
+    hero = hero.symmetric() if symmetric else hero
+    ready = time.perf_counter()
     with tqdm(total=float(frames + MESH_STEPS), desc="reconstruct", bar_format=BAR) as bar:
         pictures = render_around(hero, frames, size, on_frame=bar.update)
         rendered = time.perf_counter()
@@ -106,6 +120,7 @@ def reconstruct(
             resolution=resolution,
             num_cameras=num_cameras,
             faces=faces,
+            smooth=smooth,
             height=height,
             texture=texture,
             texture_size=texture_size,
@@ -114,7 +129,8 @@ def reconstruct(
         bar.update((bar.total or 0) - bar.n)
     seconds = {
         "encode": encoded - start,
-        f"{frames} frames of {size} pixels": rendered - encoded,
+        **({} if refined is None else {"refine": ready - encoded}),
+        f"{frames} frames of {size} pixels": rendered - ready,
         "mesh": time.perf_counter() - rendered,
     }
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -126,6 +142,8 @@ def reconstruct(
         film, film_note = write_film([on_white(picture) for picture in pictures], aside)
         views = _write_views(pictures, aside / "views")
         Image.fromarray(drawings.picture).save(aside / "drawings.png")
+        if refined is not None:
+            plot_curve(refined, aside / "refinement.png")
         text = report_text(
             drawings=drawings,
             built=built,
@@ -134,6 +152,7 @@ def reconstruct(
             views=views[:: max(1, len(views) // 4)],
             seconds=seconds,
             weights=model.source.name,
+            refined=refined,
         )
         (aside / "report.md").write_text(text, encoding="utf-8")
         _move_into(aside, output)

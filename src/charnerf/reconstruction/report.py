@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from charnerf.drawings.turnaround import Turnaround
+from charnerf.finetuning.finetune import Finetuned
+from charnerf.finetuning.report import curve_table, summary_lines
 from charnerf.meshing.build import BuiltMesh
 
 ROWS_OF_LEVELS = 8
@@ -18,6 +20,7 @@ def report_text(
     views: Sequence[Path],
     seconds: dict[str, float],
     weights: str,
+    refined: Finetuned | None = None,
 ) -> str:
     """The Markdown text of report.md; the files that it shows lie beside it.
 
@@ -29,6 +32,7 @@ def report_text(
         views: Pictures, shown in the report's order.
         seconds: By stage.
         weights: Where the model came from.
+        refined: How the weights were adapted to the drawings, if they were.
     """
     lines = ["# Reconstructed character", "", " ".join(_picture(view) for view in views[:4]), ""]
     lines += ["## What was assumed about the drawings", ""]
@@ -43,6 +47,9 @@ def report_text(
     ]
     lines += ["- [views](views): pictures with alpha, named by azimuth in degrees", ""]
     lines += _mesh_lines(built)
+    if refined is not None:
+        lines += ["", "## Refinement", "", *(f"- {one}" for one in summary_lines(refined)), ""]
+        lines += ["![error against seconds](refinement.png)", "", *curve_table(refined)]
     lines += ["", "## Seconds", "", "| stage | seconds |", "|---|---|"]
     lines += [f"| {stage} | {value:.1f} |" for stage, value in seconds.items()]
     lines += ["", f"Weights: {weights}", ""]
