@@ -63,6 +63,7 @@ def test_the_last_checkpoint_is_the_last_one_also_where_nothing_got_better(figur
         figure_dataset,
         "encoder=single",
         "sampling.train_splits=[val]",
+        "optimizer=adam",
         "optimizer.lr=1.0e-30",
         "scale.steps=2",
         "sampling.num_validations=2",
