@@ -1,7 +1,8 @@
 """Fine-tuning: what follows the combination of the views learns from one character's drawings.
 
 Encoder and f1 stay as they are. What is learnt from are rays of the drawings' own cameras; what stays near
-the starting weights are rays from elsewhere, whose targets are the start's own answers. Weights are kept
+the starting weights are rays from elsewhere, whose targets are the start's own answers. Only where the start
+is opaque: its haze is what the drawings' masks teach it to leave out. Weights are kept
 only if they are better on patches of the drawings that nothing was learnt from and still show the same
 character from elsewhere; else the starting weights come back.
 """
@@ -22,7 +23,6 @@ from charnerf.errors import DataError
 from charnerf.finetuning.known import finest, render_known
 from charnerf.finetuning.material import Material, Targets, gather, render_all
 from charnerf.finetuning.recipe import Recipe
-from charnerf.losses.terms import squared_color_error, squared_opacity_error
 from charnerf.model_api import Hero, Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import LeftOut
@@ -224,13 +224,16 @@ class _Run:
         return loss, float(learnt.detach())
 
     def _error(self, targets: Targets, count: int) -> Tensor:
+        """Mean error of some rays, each with its weight."""
         index = torch.randint(len(targets), (count,), generator=self.generator).to(targets.alpha.device)
         rgb, opacity = render_known(finest(self.network), self.renderer, targets.known, index)
         self.num_answers += int(targets.known.placed.inside[index].sum())
-        return self._weighted(rgb, opacity, targets.rgb[index], targets.alpha[index])
+        errors = self._errors(rgb, opacity, targets.rgb[index], targets.alpha[index])
+        return (targets.weights[index] * errors).mean()
 
-    def _weighted(self, rgb: Tensor, opacity: Tensor, target: Tensor, alpha: Tensor) -> Tensor:
-        return squared_color_error(rgb, target) + self.recipe.opacity * squared_opacity_error(opacity, alpha)
+    def _errors(self, rgb: Tensor, opacity: Tensor, target: Tensor, alpha: Tensor) -> Tensor:
+        colour, mask = (rgb - target).square().sum(-1), (opacity - alpha).square()
+        return colour + self.recipe.opacity * mask
 
     @torch.no_grad()
     def _look(self, step: int, learnt: float) -> CurvePoint:
@@ -243,7 +246,7 @@ class _Run:
             step=step,
             seconds=time.perf_counter() - self.start,
             learnt=learnt,
-            held_out=float(self._weighted(rgb, opacity, held.rgb, held.alpha)),
+            held_out=float(self._errors(rgb, opacity, held.rgb, held.alpha).mean()),
             held_out_psnr=_psnr(rgb, held.rgb),
             likeness=_psnr(there, guard.rgb),
         )

@@ -25,16 +25,18 @@ NOVEL_SIZE = 96  # pixels a side
 NOVEL_ELEVATIONS = (-5.0, 10.0, 25.0, 50.0)  # degrees, in turn
 GUARD_RAYS = 1024
 TRIED = 8  # rays from elsewhere that are looked up for one that is wanted: most miss the hull
+OPAQUE = 0.5  # opacity from which on the starting weights are trusted: below, they show haze
 CHUNK = 1024  # rays
 
 
 @dataclass(frozen=True)
 class Targets:
-    """Rays with what they shall show: colours on white (R, 3) and opacities (R,)."""
+    """Rays with what they shall show: colours on white (R, 3) and opacities (R,), and how much each counts (R,)."""
 
     known: KnownRays
     rgb: Tensor
     alpha: Tensor
+    weights: Tensor
 
     def __len__(self) -> int:
         return len(self.alpha)
@@ -96,7 +98,9 @@ def gather(
     )
 
     def targets(index: Tensor) -> Targets:
-        return Targets(know(network, encoded, placed[index]), rgb[index], alpha[index])
+        return Targets(
+            know(network, encoded, placed[index]), rgb[index], alpha[index], torch.ones_like(alpha[index])
+        )
 
     trusted, guard = (
         _answered(network, renderer, encoded, scene, cameras, count, generator)
@@ -177,7 +181,7 @@ def _answered(
     placed, _ = place(renderer, scene, rays[drawn], generator)
     known = know(network, encoded, placed)
     rgb, alpha = render_all(network, renderer, known)
-    return Targets(known, rgb, alpha)
+    return Targets(known, rgb, alpha, (alpha > OPAQUE).to(alpha.dtype))
 
 
 @torch.no_grad()

@@ -14,7 +14,7 @@ class Recipe:
         learning_rate: At the start; a cosine brings it to a twentieth.
         rays: Source rays of a step.
         novel_rays: Rays of a step seen from elsewhere, whose targets are the starting weights' answers.
-        trust: Weight of these targets.
+        trust: Weight of these targets, where the start is opaque.
         opacity: Weight of the rays' opacity against the mask.
         clip: Bound on the gradient's norm.
         held_out: Share of the drawings' patches that nothing is learnt from.
@@ -27,19 +27,19 @@ class Recipe:
         seed: Of patches, rays and jitter.
     """
 
-    seconds: float = 20.0
+    seconds: float = 30.0
     learning_rate: float = 1e-3
-    rays: int = 512
-    novel_rays: int = 256
-    trust: float = 0.3
-    opacity: float = 0.1
+    rays: int = 256
+    novel_rays: int = 128
+    trust: float = 1.0
+    opacity: float = 0.3
     clip: float = 1.0
     held_out: float = 0.2
     patches: int = 16
-    check_every: int = 10
-    patience: int = 8
-    least_likeness: float = 25.0
-    most_steps: int = 2000
+    check_every: int = 20
+    patience: int = 3
+    least_likeness: float = 28.0
+    most_steps: int = 120
     memory_mib: float = 1024.0
     seed: int = 0
 
