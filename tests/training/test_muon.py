@@ -111,7 +111,9 @@ def test_it_levels_what_a_gradient_step_can_not():
         sgd.zero_grad()
         loss(plain).backward()
         sgd.step()
-    assert (weight - target).abs().max() < 0.3  # the rate is a step of a fixed length: it circles at that distance
+    assert (
+        weight - target
+    ).abs().max() < 0.3  # the rate is a step of a fixed length: it circles at that distance
     assert (plain - target).abs().max() > 0.9
 
 
@@ -120,3 +122,11 @@ def test_a_rate_must_be_positive(name):
     rates = {"lr": 1e-3, "matrix_lr": 1e-2} | {name: 0.0}
     with pytest.raises(ValueError, match=name):
         MuonWithAdam([nn.Parameter(torch.zeros(3))], **rates)
+
+
+@pytest.mark.parametrize("shape", [(6, 9), (9, 6), (7, 7)])
+def test_matrices_of_one_shape_turn_together_as_alone(shape):
+    matrices = torch.randn(3, *shape, generator=torch.Generator().manual_seed(5))
+    together = orthogonalized(matrices)
+    for one, turned in zip(matrices, together, strict=True):
+        torch.testing.assert_close(turned, orthogonalized(one), atol=1e-5, rtol=1e-5)

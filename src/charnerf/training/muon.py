@@ -53,33 +53,47 @@ class MuonWithAdam(torch.optim.Optimizer):
             with torch.enable_grad():
                 loss = closure()
         for group in self.param_groups:
-            move = self._turn if group["orthogonal"] else self._adam
-            for parameter in group["params"]:
-                if parameter.grad is not None:
-                    move(parameter, parameter.grad, group["lr"])
+            parameters = [one for one in group["params"] if one.grad is not None]
+            if parameters:
+                move = self._turn if group["orthogonal"] else self._adam
+                move(parameters, [one.grad for one in parameters], group["lr"])
         return loss
 
-    def _turn(self, parameter: Tensor, gradient: Tensor, rate: float) -> None:
-        state = self.state[parameter]
-        if not state:
-            state["momentum"] = torch.zeros_like(gradient)
-        state["momentum"].lerp_(gradient, 1.0 - MOMENTUM)
-        ahead = gradient.lerp(state["momentum"], MOMENTUM)
-        turned = orthogonalized(ahead.flatten(1)).to(parameter.dtype)
-        rows, columns = turned.shape
-        parameter.add_(turned.reshape(parameter.shape), alpha=-rate * max(1.0, rows / columns) ** 0.5)
+    def _turn(self, parameters: list[Tensor], gradients: list[Tensor], rate: float) -> None:
+        """Move matrices along their orthogonalised momentum, those of one shape together."""
+        for parameter in parameters:
+            if not self.state[parameter]:
+                self.state[parameter]["momentum"] = torch.zeros_like(parameter)
+        momenta = [self.state[parameter]["momentum"] for parameter in parameters]
+        torch._foreach_lerp_(momenta, gradients, 1.0 - MOMENTUM)
+        ahead = torch._foreach_lerp(gradients, momenta, MOMENTUM)
+        alike: dict[tuple[int, int], list[int]] = {}
+        for index, parameter in enumerate(parameters):
+            alike.setdefault((parameter.shape[0], parameter[0].numel()), []).append(index)
+        for (rows, columns), chosen in alike.items():
+            turned = orthogonalized(torch.stack([ahead[index].flatten(1) for index in chosen]))
+            moved = [parameters[index] for index in chosen]
+            steps = [one.reshape(to.shape).to(to.dtype) for one, to in zip(turned, moved, strict=True)]
+            torch._foreach_add_(moved, steps, alpha=-rate * max(1.0, rows / columns) ** 0.5)
 
-    def _adam(self, parameter: Tensor, gradient: Tensor, rate: float) -> None:
-        state = self.state[parameter]
-        if not state:
-            state["step"] = torch.zeros((), dtype=torch.float32)
-            state["mean"], state["square"] = torch.zeros_like(gradient), torch.zeros_like(gradient)
-        state["step"] += 1
-        step = float(state["step"])
-        state["mean"].lerp_(gradient, 1.0 - BETAS[0])
-        state["square"].mul_(BETAS[1]).addcmul_(gradient, gradient, value=1.0 - BETAS[1])
-        scale = (state["square"] / (1.0 - BETAS[1] ** step)).sqrt_().add_(EPSILON)
-        parameter.addcdiv_(state["mean"], scale, value=-rate / (1.0 - BETAS[0] ** step))
+    def _adam(self, parameters: list[Tensor], gradients: list[Tensor], rate: float) -> None:
+        for parameter in parameters:
+            if not (state := self.state[parameter]):
+                state["step"] = torch.zeros((), dtype=torch.float32)
+                state["mean"], state["square"] = torch.zeros_like(parameter), torch.zeros_like(parameter)
+        states = [self.state[parameter] for parameter in parameters]
+        means, squares = [one["mean"] for one in states], [one["square"] for one in states]
+        torch._foreach_add_([one["step"] for one in states], 1)
+        torch._foreach_lerp_(means, gradients, 1.0 - BETAS[0])
+        torch._foreach_mul_(squares, BETAS[1])
+        torch._foreach_addcmul_(squares, gradients, gradients, value=1.0 - BETAS[1])
+        steps = [float(one["step"]) for one in states]
+        scales = torch._foreach_div(squares, [1.0 - BETAS[1] ** step for step in steps])
+        torch._foreach_sqrt_(scales)
+        torch._foreach_add_(scales, EPSILON)
+        torch._foreach_addcdiv_(
+            parameters, means, scales, [-rate / (1.0 - BETAS[0] ** step) for step in steps]
+        )
 
 
 def is_matrix(parameter: Tensor) -> bool:
@@ -87,22 +101,24 @@ def is_matrix(parameter: Tensor) -> bool:
     return parameter.ndim >= 2 and min(parameter.shape[0], parameter[0].numel()) >= LEAST_SIDE
 
 
-def orthogonalized(matrix: Tensor) -> Tensor:
-    """Roughly U V^T of a matrix U S V^T: its singular values go to about 1 (0.7 to 1.2), its zeros stay zero.
+def orthogonalized(matrices: Tensor) -> Tensor:
+    """Roughly U V^T of matrices U S V^T: singular values go to about 1 (0.7 to 1.2), zeros stay zero.
 
     Five quintic Newton-Schulz steps, which need products only.
 
     Args:
-        matrix: (rows, columns), of any scale.
+        matrices: (rows, columns), or several of one shape, (N, rows, columns); of any scale.
 
     Source: Jordan et al. 2024.
     """
-    tall = matrix.shape[0] > matrix.shape[1]
-    x = matrix.T if tall else matrix
+    tall = matrices.shape[-2] > matrices.shape[-1]
+    x = (matrices.mT if tall else matrices).reshape(-1, *sorted(matrices.shape[-2:]))
     tiny = torch.finfo(x.dtype).tiny
-    x = x / x.abs().amax().clamp_min(tiny)  # the squares of a norm would leave the range of floats
-    x = x / x.norm().clamp_min(tiny)
+    x = x / x.abs().amax((-2, -1), keepdim=True).clamp_min(
+        tiny
+    )  # the squares of a norm would leave the range of floats
+    x = x / torch.linalg.vector_norm(x, dim=(-2, -1), keepdim=True).clamp_min(tiny)
     for a, b, c in NEWTON_SCHULZ:
-        square = x @ x.T
-        x = torch.addmm(x, torch.addmm(square, square, square, beta=b, alpha=c), x, beta=a)
-    return x.T if tall else x
+        square = x @ x.mT
+        x = torch.baddbmm(x, torch.baddbmm(square, square, square, beta=b, alpha=c), x, beta=a)
+    return (x.mT if tall else x).reshape(matrices.shape)
