@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from charnerf import cli_meshes
+from charnerf import cli_drawings, cli_meshes
 from charnerf.cli_finetune import finetune
 from charnerf.cli_options import (
     Dataset,
@@ -180,6 +180,8 @@ def evaluate(
     )
 
 
+app.command(epilog=DEBUG_NOTE)(cli_drawings.draw)
+app.command(epilog=DEBUG_NOTE)(cli_drawings.gallery)
 app.command(epilog=DEBUG_NOTE)(cli_meshes.mesh)
 app.command(epilog=DEBUG_NOTE)(cli_meshes.reconstruct)
 app.command(epilog=DEBUG_NOTE)(finetune)

@@ -267,6 +267,33 @@ def finetune(
     )
 
 
+def draw(data: Path, characters: Sequence[str], output: Path, *, size: int, seed: int) -> None:
+    """Write drawings of characters of a data set."""
+    from charnerf.drawings.artist import draw_character, write_drawings
+
+    known = [load_character(data, name) for name in characters]
+    for character in known:
+        folder = output / character.name if len(known) > 1 else output
+        files = write_drawings(draw_character(character, size=size, seed=seed), folder)
+        say(", ".join(str(file) for file in files))
+
+
+def gallery(
+    folders: Sequence[Path],
+    output: Path,
+    *,
+    weights: Path | None,
+    size: int,
+    device: str,
+    trust: Sequence[str],
+) -> None:
+    """Write one picture of the reconstructions of several folders of drawings."""
+    from charnerf.reconstruction.gallery import write_gallery
+
+    model = load_model(weights, device=device, trust=trust)
+    say(f"gallery: {write_gallery(model, folders, output, size=size)}")
+
+
 def report(folder: Path, *, drawings: Path | None, trust: Sequence[str]) -> None:
     """Write the report of a run, or over all runs below a folder."""
     say(f"report: {write_report(folder, drawings=drawings, trusted=trust)}")

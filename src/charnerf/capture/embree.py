@@ -102,6 +102,13 @@ def capture_character(scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOp
     return CapturedCharacter(pictures=pictures, surface=surface)
 
 
+def capture_sources(surface: SurfaceMesh, size: int) -> np.ndarray:
+    """Orthographic source views of a surface, front, side and back, RGBA uint8 (3, size, size, 4)."""
+    options = CaptureOptions(views=1, size=size)
+    studio = _Studio(surface, options)
+    return np.stack([studio.shoot(camera).rgba for camera in _each(framing_cameras(surface, options)[1])])
+
+
 def _each(cameras: Cameras) -> Iterator[Cameras]:
     """One camera of shape () after the other, float32 as Embree's rays are."""
     for index in range(len(cameras.orthographic)):

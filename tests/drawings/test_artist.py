@@ -1,0 +1,44 @@
+"""Drawings of a known character can be read back as drawings, and stand where the character stands."""
+
+import numpy as np
+import pytest
+import torch
+
+from charnerf.data.characters import load_character
+from charnerf.data.layout import names_of, read_dataset
+from charnerf.drawings.artist import PAPER, draw_character, write_drawings
+from charnerf.drawings.turnaround import read_turnaround
+
+
+@pytest.fixture(scope="module")
+def character(figure_dataset):
+    return load_character(figure_dataset, names_of(read_dataset(figure_dataset), "train")[0])
+
+
+def test_drawings_have_the_size_that_is_asked_for_and_lie_on_paper(character):
+    drawings = draw_character(character, size=96, seed=1)
+    assert list(drawings) == ["front", "side", "back"]
+    for pixels in drawings.values():
+        assert pixels.shape == (96, 96, 3) and pixels.dtype == np.uint8
+        assert tuple(pixels[0, 0]) == PAPER
+        assert (pixels != np.array(PAPER)).any()
+
+
+def test_a_seed_is_an_artist_and_each_character_has_its_own_style(character, figure_dataset):
+    first, again, other = (draw_character(character, size=64, seed=seed) for seed in (1, 1, 2))
+    assert all(np.array_equal(first[view], again[view]) for view in first)
+    assert not np.array_equal(first["front"], other["front"])
+
+
+def test_reconstruct_reads_them_as_the_silhouettes_that_were_drawn(character, tmp_path):
+    """The masks that are cut out of the paper against the captured ones, both brought to one height."""
+    front, side, back = write_drawings(draw_character(character, size=256, seed=3), tmp_path)
+    size = character.sources.images.shape[-1]
+    read = read_turnaround(front, side, back, size=size, side_is="left").views
+    for view in range(3):
+        extents = []
+        for images in (read.images, character.sources.images):
+            mask = images[0, view, 3] > 0.5
+            rows, columns = torch.nonzero(mask, as_tuple=True)
+            extents.append(float((columns.max() - columns.min() + 1) / (rows.max() - rows.min() + 1)))
+        assert extents[0] == pytest.approx(extents[1], abs=0.08)  # two pixels of 32
