@@ -14,6 +14,18 @@ def group_norm(channels: int) -> nn.GroupNorm:
 
 
 @final
+class PointwiseConv(nn.Conv2d):
+    """A 1x1 convolution as a linear layer of the channels: on a CPU the kernel for small convolutions copies to channels first."""
+
+    def __init__(self, in_channels: int, out_channels: int) -> None:
+        super().__init__(in_channels, out_channels, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (N, C_in, h, w) to (N, C_out, h, w), channels last."""
+        return F.linear(x.permute(0, 2, 3, 1), self.weight.flatten(1), self.bias).permute(0, 3, 1, 2)
+
+
+@final
 class ConvBlock(nn.Module):
     """Three 3x3 convolutions of C/2, C/4, C/4 channels, concatenated, plus a residual."""
 
@@ -23,16 +35,16 @@ class ConvBlock(nn.Module):
         sizes = ((in_channels, half), (half, quarter), (quarter, out_channels - half - quarter))
         self.norms = nn.ModuleList(group_norm(a) for a, _ in sizes)
         self.convs = nn.ModuleList(nn.Conv2d(a, b, 3, padding=1, bias=False) for a, b in sizes)
-        self.skip = nn.Identity() if in_channels == out_channels else nn.Conv2d(in_channels, out_channels, 1)
+        self.skip = nn.Identity() if in_channels == out_channels else PointwiseConv(in_channels, out_channels)
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (N, C_in, h, w) to (N, C_out, h, w)."""
         parts = []
         y = x
         for norm, conv in zip(self.norms, self.convs, strict=True):
-            y = conv(F.relu(norm(y)))
+            y = conv(F.relu_(norm(y)))
             parts.append(y)
-        return self.skip(x) + torch.cat(parts, dim=1)
+        return torch.cat(parts, dim=1).add_(self.skip(x))
 
 
 @final
@@ -86,16 +98,16 @@ class StackedHourglass(nn.Module):
         self.tops = nn.ModuleList(
             nn.Sequential(
                 ConvBlock(in_channels=width, out_channels=width),
-                nn.Conv2d(width, width, 1),
+                PointwiseConv(width, width),
                 group_norm(width),
                 nn.ReLU(),
             )
             for _ in range(num_stacks)
         )
-        self.outputs = nn.ModuleList(nn.Conv2d(width, out_channels, 1) for _ in range(num_stacks))
+        self.outputs = nn.ModuleList(PointwiseConv(width, out_channels) for _ in range(num_stacks))
         # the way back into the trunk, for all stacks but the last
-        self.features_back = nn.ModuleList(nn.Conv2d(width, width, 1) for _ in range(num_stacks - 1))
-        self.outputs_back = nn.ModuleList(nn.Conv2d(out_channels, width, 1) for _ in range(num_stacks - 1))
+        self.features_back = nn.ModuleList(PointwiseConv(width, width) for _ in range(num_stacks - 1))
+        self.outputs_back = nn.ModuleList(PointwiseConv(out_channels, width) for _ in range(num_stacks - 1))
 
     def forward(self, images: Tensor) -> Tensor:
         """Map images (N, C, H, W) to features (N, F, H / stride, W / stride)."""
