@@ -115,7 +115,7 @@ def test_no_background_bleeds_in_even_where_the_mesh_is_larger_than_drawn():
     def red(view, x, y):
         return torch.tensor((1.0, 0.2, 0.0)).expand(*x.shape, 3), x**2 + y**2 < 0.76**2
 
-    soft = _views(red)
+    soft = _views(red, size=512)
     soft.images[:, :, :3] = torch.nn.functional.avg_pool2d(soft.images[0, :, :3], 3, 1, 1)[None]
     drawn = Projector(soft, mesh := _ball()).at(mesh.vertices, mesh.vertex_normals, _some_face(mesh))
     seen = drawn.trust > 0

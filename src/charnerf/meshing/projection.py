@@ -34,8 +34,8 @@ SMOOTH = 0.04  # metres: standard deviation of the smooth band
 BESIDE = 0.012  # metres, or one pixel if that is more: so near to an occluder's outline a point is doubted
 BEHIND = 0.04  # metres that a point must lie behind an occluder to be doubted
 IN_FRONT = 0.01  # metres in front of a point that still are the point: bumps of the surface
-LEAST_COSINE = 0.1  # flatter than this a drawing shows streaks
-DOUBTED = 0.05  # weight of what is doubted, beside 1
+LEAST_COSINE = 0.05  # flatter than this a drawing shows streaks
+DOUBTED = 0.3  # weight of what is doubted, beside 1
 WIDE, NARROW = 3, 12  # powers of the cosine that weigh views in the smooth and in the fine band
 DEPTH_SIZE = 512  # pixels a side, at most, of the maps of depth
 
@@ -148,14 +148,25 @@ def _bands(image: np.ndarray, pixels_a_metre: float) -> tuple[np.ndarray, np.nda
         opaque = image[..., 3] >= image[..., 3].max()
     depth = ndimage.distance_transform_edt(np.pad(opaque, 1))[1:-1, 1:-1]
     ridge = opaque & (depth >= ndimage.maximum_filter(depth, size=3))  # thin parts keep their middle
-    believed = (depth > max(1.5, EDGE * pixels_a_metre)) | ridge
+    edge = int(EDGE * pixels_a_metre)
+    believed = (depth > edge + 0.5) | ridge  # the half takes diagonal neighbours of the background, too
     nearest = tuple(ndimage.distance_transform_edt(~believed, return_distances=False, return_indices=True))
     colour = image[..., :3].astype(np.float64)
     sigma = max(1.0, SMOOTH * pixels_a_metre)
     share = ndimage.gaussian_filter(believed.astype(np.float64), sigma)
     blurred = [ndimage.gaussian_filter(colour[..., c] * believed, sigma) for c in range(3)]
     smooth = np.stack(blurred, axis=-1) / np.maximum(share, 1e-12)[..., None]
-    return smooth[nearest], (colour - smooth)[nearest], believed
+    fine = np.stack([_between(band) for band in np.moveaxis((colour - smooth)[nearest], -1, 0)], axis=-1)
+    return smooth[nearest], fine, believed
+
+
+def _between(band: np.ndarray) -> np.ndarray:
+    """Values (H, W) at pixel centres so that the mean over each pixel, read bilinearly, is the one given.
+
+    Hat functions averaged over a pixel are the quadratic spline at whole numbers, whose inverse filter is
+    known. Without, reading between pixels would blur what the texture shows.
+    """
+    return np.asarray(ndimage.spline_filter(band, order=2, mode="nearest"))
 
 
 def _pixels_a_metre(camera: Cameras) -> float:

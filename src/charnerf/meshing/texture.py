@@ -20,7 +20,7 @@ from charnerf.meshing.colour import field_colours
 from charnerf.meshing.projection import Projector
 from charnerf.types import Scene, SourceViews
 
-ENOUGH = 0.3  # trust from which the drawings decide alone
+ENOUGH = 0.1  # trust from which the drawings decide alone
 FADE = 0.08  # metres over which the field's colours are matched to the drawings' beside them
 MATERIAL = "character"
 TEXTURE_SIZE = 1024
