@@ -52,6 +52,7 @@ WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may impor
     ("training", "runs"),
     ("reporting", "drawings"),
     ("reporting", "evaluation"),
+    ("reporting", "meshing"),
     ("reporting", "model_api"),
     ("reporting", "runs"),
 }

@@ -6,6 +6,7 @@ import sys
 import pytest
 import yaml
 
+from charnerf.errors import DataError
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.reporting.folder_report import write_folder_report
 from charnerf.reporting.rows import group_rows, read_runs, read_unfinished
@@ -116,3 +117,28 @@ def test_a_run_without_its_data_or_views_is_told(grid, tmp_path):
     assert "kept no figures of single views" in text
     assert "does not say where its data set is" in text
     assert "| charnerf | - | 40 s | 90 |" in text  # steps from the curve
+
+
+def test_levels_of_detail_stand_beside_the_papers(grid):
+    meshes = grid / "2" / "meshes"
+    meshes.mkdir(exist_ok=True)
+    level = {
+        "file": "hero_LOD1",
+        "grid": 64,
+        "faces_asked": None,
+        "vertices": 1800,
+        "faces": 3600,
+        "parts": 1,
+    }
+    decimated = {**level, "file": "hero_LOD2", "faces_asked": 500}
+    both = [{**one, "chamfer_mm": 3.5, "seconds": 0.5} for one in (level, decimated)]
+    (meshes / "lods.json").write_text(json.dumps(both))
+    text = write_folder_report(grid).read_text()
+    assert "| charnerf | hero_LOD1 | 64 | 1800 | 1822 | 3600 | 3640 | 1 | 3.50 | 0.5 s |" in text
+    assert "| charnerf | hero_LOD2 | 64 | 1800 | - | 3600 | - |" in text
+    (meshes / "lods.json").write_text("{}")
+    assert "## Table I\n" not in write_folder_report(grid).read_text()
+    (meshes / "lods.json").write_text("[1]")
+    with pytest.raises(DataError, match="charnerf mesh --lod"):
+        write_folder_report(grid)
+    (meshes / "lods.json").unlink()

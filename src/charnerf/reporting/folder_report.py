@@ -10,6 +10,7 @@ from charnerf.reporting.by_angle import by_angle
 from charnerf.reporting.characters import characters
 from charnerf.reporting.comparison import best_row, comparison, costs, sorted_rows, unfinished
 from charnerf.reporting.drawn import drawn_matrix
+from charnerf.reporting.levels import levels
 from charnerf.reporting.matrix import matrix
 from charnerf.reporting.parts import verdict, write_report
 from charnerf.reporting.rows import Row, Run, common_overrides, group_rows, read_runs, read_unfinished
@@ -53,6 +54,7 @@ def write_folder_report(
     if drawings is not None:
         blocks += drawn_matrix(rows, drawings, folder, trusted=trusted)
     blocks += attention(rows, folder, trusted=trusted)
+    blocks += levels(rows)
     blocks += characters(rows)
     return write_report(folder, title, blocks)
 

@@ -9,6 +9,3 @@ TABLE_TWO = {
     "charnerf": ("CharNeRF", {"psnr": 34.3, "ssim": 0.988, "lpips": 0.031}),
 }
 """Table II, by the name of our experiment: the paper's name of the row, its metrics."""
-
-TABLE_ONE = {64: (1822, 3640), 128: (7646, 15288), 256: (49582, 98972)}
-"""Table I, by grid points along a side: vertices and polygons."""

@@ -7,6 +7,7 @@ from charnerf.reporting.attention import attention
 from charnerf.reporting.blocks import Block
 from charnerf.reporting.drawn import drawn_matrix
 from charnerf.reporting.folder_report import write_folder_report
+from charnerf.reporting.levels import levels
 from charnerf.reporting.rows import group_rows, read_runs
 from charnerf.reporting.run_report import write_run_report
 
@@ -32,4 +33,4 @@ def report(folder: Path, *, drawings: Path | None = None, trusted: Sequence[str]
     more: list[Block] = attention(rows, folder, trusted=trusted)
     if drawings is not None:
         more += drawn_matrix(rows, drawings, folder, trusted=trusted)
-    return write_run_report(folder, more=more)
+    return write_run_report(folder, more=[*more, *levels(rows)])
