@@ -30,7 +30,18 @@ LAYERS = (
         "training",
     ),
     ("bench",),
-    ("cli", "cli_drawings", "cli_meshes", "cli_finetune", "cli_options", "commands", "__main__", "__init__"),
+    (
+        "cli",
+        "cli_card",
+        "cli_drawings",
+        "cli_meshes",
+        "cli_finetune",
+        "cli_options",
+        "commands",
+        "commands_meshes",
+        "__main__",
+        "__init__",
+    ),
 )
 LAYER_OF = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may import one another
@@ -60,7 +71,7 @@ ONLY_IN = {  # foreign package: where it may be imported
     "hydra": ("config", "runs"),
     "omegaconf": ("config", "runs", "commands", "training/run", "training/finish", "training/cells"),
     "lightning": ("training", "data/datamodule"),
-    "typer": ("cli", "cli_drawings", "cli_meshes", "cli_finetune", "cli_options"),
+    "typer": ("cli", "cli_card", "cli_drawings", "cli_meshes", "cli_finetune", "cli_options"),
 }
 
 GLOBAL_SETTERS = {

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import typer
 
 from charnerf import cli_drawings, cli_meshes
+from charnerf.cli_card import card
 from charnerf.cli_finetune import finetune
 from charnerf.cli_options import (
     Dataset,
@@ -180,6 +181,7 @@ def evaluate(
     )
 
 
+app.command(epilog=DEBUG_NOTE)(card)
 app.command(epilog=DEBUG_NOTE)(cli_drawings.draw)
 app.command(epilog=DEBUG_NOTE)(cli_drawings.gallery)
 app.command(epilog=DEBUG_NOTE)(cli_meshes.mesh)
