@@ -34,18 +34,19 @@ def train(cfg: DictConfig) -> None:
 
 def train_all() -> None:
     """Train a run; or a grid, and report over it, also if some of its cells failed."""
-    from charnerf.training.grid import check_grid, report_grid
+    from charnerf.training.grid import begin_grid, check_grid, report_grid
 
     grid = grid_command(sys.argv[1:])
     if grid is None:
         train()
         return
     sys.argv[1:] = grid.arguments
+    since = begin_grid(grid.folder)
     try:
         train()
     finally:
         report_grid(grid.folder)
-    check_grid(grid.folder)
+    check_grid(grid.folder, since=since)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 from charnerf.config.grid import config_hash, grid_command
 from charnerf.errors import ConfigError, GridError
 from charnerf.training.cells import cells_of, read_cell, run_cell
-from charnerf.training.grid import check_grid, report_grid
+from charnerf.training.grid import begin_grid, check_grid, report_grid
 
 
 class Trainer:
@@ -68,6 +69,18 @@ def test_a_failed_cell_is_recorded_and_tried_again(tmp_path):
     assert cell(tmp_path, Trainer()).state == "done"
     assert not (tmp_path / failed.name / "error.txt").exists()
     check_grid(tmp_path)
+
+
+def test_only_what_this_sweep_asked_for_counts(tmp_path):
+    """Defaults have changed: the failed cell of before is another one."""
+    cell(tmp_path, Trainer(error=ArithmeticError("loss: found nan")), rate=1.0)
+    time.sleep(0.05)
+    since = begin_grid(tmp_path)
+    time.sleep(0.05)
+    cell(tmp_path, Trainer(), rate=2.0)
+    check_grid(tmp_path, since=since)
+    with pytest.raises(GridError, match="1 of 2"):
+        check_grid(tmp_path)
 
 
 def test_whoever_stops_the_sweep_stops_it(tmp_path):

@@ -22,6 +22,7 @@ from charnerf.training.run import run_training
 
 log = logging.getLogger(__name__)
 CELL_FILE, ERROR_FILE, LOCK_FILE, LOG_FILE = "cell.json", "error.txt", ".cell.lock", "train.log"
+ASKED_FILE = ".asked"  # its time tells when a sweep last asked for the cell
 DONE, RUNNING, FAILED, INTERRUPTED = "done", "running", "failed", "interrupted"
 MAX_NAME = 120  # characters of a folder's name
 
@@ -67,6 +68,7 @@ def run_cell(
     """
     folder = cell_folder(grid, cfg, name)
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / ASKED_FILE).touch()
     with _alone(folder) as is_alone:
         found = read_cell(folder)
         if found is not None and found.state == DONE:
@@ -103,12 +105,20 @@ def read_cell(folder: Path) -> Cell | None:
         raise DataError(f"{file}: can not be read ({error}), expected a cell's state; remove it.") from error
 
 
-def cells_of(grid: Path) -> list[Cell]:
-    """All cells of a grid that were begun, by name; a running one that nobody works on is interrupted."""
+def cells_of(grid: Path, *, since: float = 0.0) -> list[Cell]:
+    """Cells of a grid that were begun, by name; a running one that nobody works on is interrupted.
+
+    Args:
+        grid: Folder of all cells.
+        since: Leave out cells that no sweep has asked for since this time of the file system: a grid whose defaults have changed
+            still holds those of before.
+    """
     cells = []
     for file in sorted(grid.glob(f"*/{CELL_FILE}")):
         cell = read_cell(file.parent)
-        assert cell is not None
+        asked = file.with_name(ASKED_FILE)
+        if cell is None or (asked.is_file() and asked.stat().st_mtime < since):
+            continue
         if cell.state == RUNNING:
             with _alone(file.parent) as is_alone:
                 state = INTERRUPTED if is_alone else RUNNING

@@ -8,6 +8,14 @@ from charnerf.reporting.folder_report import write_folder_report
 from charnerf.training.cells import DONE, cells_of
 
 log = logging.getLogger(__name__)
+BEGUN_FILE = ".begun"
+
+
+def begin_grid(grid: Path) -> float:
+    """Note that a sweep begins; the file system's time of it."""
+    grid.mkdir(parents=True, exist_ok=True)
+    (grid / BEGUN_FILE).touch()
+    return (grid / BEGUN_FILE).stat().st_mtime
 
 
 def report_grid(grid: Path) -> Path | None:
@@ -19,13 +27,17 @@ def report_grid(grid: Path) -> Path | None:
     return report
 
 
-def check_grid(grid: Path) -> None:
+def check_grid(grid: Path, *, since: float = 0.0) -> None:
     """Say which cells of a grid are not done.
+
+    Args:
+        grid: Folder of all cells.
+        since: When the sweep began whose cells count; all cells count by default.
 
     Raises:
         GridError: Names each one with its state and error.
     """
-    cells = cells_of(grid)
+    cells = cells_of(grid, since=since)
     left = [cell for cell in cells if cell.state != DONE]
     if not left:
         return
