@@ -194,6 +194,12 @@ def test_levels_of_detail_come_in_one_call_with_one_table(
         file = tmp_path / "x" / f"{row['file']}.obj"
         assert file.with_suffix(".mtl").is_file() and file.with_suffix(".png").is_file()
         assert trimesh.load(file, force="mesh").extents[1] == pytest.approx(1.5, abs=1e-5)
+    whole = [*where[:4], "--split", "test", "-o", str(tmp_path / "y"), "--resolution", "24", "--faces", "200"]
+    assert run([*whole, "--texture-size", "64"]) == 0
+    text = (tmp_path / "y" / "meshes.md").read_text()
+    assert "| robot |" in text and "| **mean** |" in text and text in capsys.readouterr().out
+    assert (tmp_path / "y" / "robot" / "robot.glb").is_file()
+    assert run(whole[:4] + whole[6:]) == 2
     assert run([*where, "--lod", "16,many"]) == 2
     assert run([*where, "--faces", "3"]) == 2
 

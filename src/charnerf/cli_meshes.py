@@ -50,8 +50,17 @@ def numbers(text: str | None, name: str, least: int) -> tuple[int, ...]:
 def mesh(
     *,
     data: Dataset,
-    character: Annotated[str, typer.Option(metavar="NAME", help="Character of the data set.")],
     output: Folder,
+    character: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Character of the data set; this or --split.")
+    ] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="All characters of a split, and DIR/meshes.md: what meshes and each kind of colours are worth.",
+        ),
+    ] = None,
     weights: Weights = None,
     resolution: Resolution = 128,
     lod: Annotated[
@@ -85,14 +94,16 @@ def mesh(
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
-    """Make the mesh of one character of a data set: DIR/NAME.glb, metres, and a contact sheet.
+    """Make the mesh of a character of a data set: DIR/NAME.glb, metres, and a contact sheet.
 
     Several levels of detail are DIR/NAME_LOD0.glb (the finest) and so on; their table is printed and
     written to DIR/lods.md and DIR/lods.json.
     """
-    from charnerf import commands
+    from charnerf import commands, commands_meshes
     from charnerf.reconstruction.meshes import MeshRequest
 
+    if (character is None) == (split is None):
+        raise typer.BadParameter("expected one of the two.", param_hint="--character, --split")
     request = MeshRequest(
         resolutions=numbers(lod, "--lod", 16) or (resolution,),
         faces=numbers(faces, "--faces", 4),
@@ -106,7 +117,12 @@ def mesh(
         texture_size=texture_size,
         suffix=format_,
     )
-    commands.mesh(weights, data, character, output, request=request, device=device, trust=trust or [])
+    if split is not None:
+        commands_meshes.measure(
+            weights, data, split, output, request=request, device=device, trust=trust or []
+        )
+    if character is not None:
+        commands.mesh(weights, data, character, output, request=request, device=device, trust=trust or [])
 
 
 def reconstruct(
