@@ -73,15 +73,39 @@ def test_what_was_not_kept_is_said_and_loads_too(model, person_views, tmp_path):
 
 
 def test_the_command_writes_weights_that_reconstruct_can_use(model, person_views, tmp_path, capsys):
-    drawings = []
-    for view, name in enumerate(("front", "side", "back")):
-        picture = (255 * person_views.images[0, view].permute(1, 2, 0)).round().byte().numpy()
-        drawings.append(tmp_path / f"{name}.png")
-        Image.fromarray(picture).resize((96, 96)).save(drawings[-1])
-    arguments = [*map(str, drawings), "-o", str(tmp_path / "fitted"), "--weights", str(model.source)]
+    drawings = _drawings(person_views, tmp_path)
+    arguments = [*drawings, "-o", str(tmp_path / "fitted"), "--weights", str(model.source)]
     assert run(["finetune", *arguments, "--seconds", "2", "--device", "cpu"]) == 0
     told = capsys.readouterr().err
     assert "floor line" in told and "Left out" in told and "report.md" in told
     assert charnerf.load(tmp_path / "fitted").note is not None
     assert run(["finetune", *arguments, "--seconds", "0"]) == 2
-    assert run(["finetune", *arguments[:3], "-o", str(drawings[0]), "--seconds", "2"]) != 0
+    assert run(["finetune", *arguments[:3], "-o", drawings[0], "--seconds", "2"]) != 0
+
+
+def test_reconstruct_refines_first_and_reports_it(model, person_views, tmp_path, capsys):
+    arguments = [
+        *_drawings(person_views, tmp_path),
+        "-o",
+        str(tmp_path / "hero"),
+        "--weights",
+        str(model.source),
+    ]
+    small = ["--frames", "1", "--size", "16", "--resolution", "24", "--faces", "200", "--texture", "vertex"]
+    options = ["--refine", "1", "--smooth", "2", "--symmetric", "--device", "cpu"]
+    assert run(["reconstruct", *arguments, *small, *options]) == 0
+    told = capsys.readouterr().err
+    assert "Left out" in told and "drawings' rays" in told
+    text = (tmp_path / "hero" / "report.md").read_text()
+    assert "## Refinement" in text and "| refine |" in text
+    assert (tmp_path / "hero" / "refinement.png").is_file()
+
+
+def _drawings(views, folder) -> list[str]:
+    """The views as picture files."""
+    paths = []
+    for view, name in enumerate(("front", "side", "back")):
+        picture = (255 * views.images[0, view].permute(1, 2, 0)).round().byte().numpy()
+        paths.append(str(folder / f"{name}.png"))
+        Image.fromarray(picture).resize((96, 96)).save(paths[-1])
+    return paths

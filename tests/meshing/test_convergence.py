@@ -5,13 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-from analytic_scenes import scene_of, sphere
+from analytic_scenes import figure, scene_of, sphere
 
+from charnerf.geometry.cameras import cameras_towards
 from charnerf.meshing.convergence import (
     convergence_lines,
     direction_spread,
     measure_convergence,
 )
+from charnerf.model_api import Hero
+from charnerf.reconstruction.meshes import MeshRequest, write_meshes
+from charnerf.types import Scene, SourceViews
 
 
 def _directed(strength: float):
@@ -58,3 +62,24 @@ def test_spread_is_the_relative_deviation_over_directions():
     factor = 1.0 + 0.5 * (offset / offset.norm(dim=-1, keepdim=True))[..., 0]
     expected = (factor.std(1, correction=0) / factor.mean(1)).mean()
     assert direction_spread(scene, near) == pytest.approx(float(expected), rel=1e-4)
+
+
+def test_meshes_come_with_levels_and_cameras_where_asked(tmp_path):
+    made = scene_of(figure, width=0.1)
+    scene = Scene(made.field, None, None, made.box_min, made.box_max, False)
+    camera = cameras_towards(
+        torch.tensor([[0.0, -1.0, 0.0]]),
+        target=torch.tensor([0.0, 0.0, 1.0]),
+        distance=4.0,
+        half_extent=1.2,
+        size=32,
+        orthographic=True,
+    )
+    flags = torch.zeros(1, 1, dtype=torch.bool)
+    views = SourceViews(torch.full((1, 1, 4, 32, 32), 0.5), camera[None], ~flags, flags)
+    request = MeshRequest((32,), faces=(400,), smooth=3, symmetric=True, convergence=True)
+    done = write_meshes(Hero(scene, views, None), "figure", tmp_path, request)
+    text = (tmp_path / "figure_cameras.md").read_text()
+    assert "| density | distance, mm | IoU |" in text and "one evaluation is exact" in text
+    assert any("one evaluation is exact" in one for one in done.said)
+    assert done.meshes[0].is_file()
