@@ -12,8 +12,10 @@ import torch
 import helpers
 import tiny_models
 from charnerf.bench.baseline import PixelAligned, PixelNeRFLike
+from charnerf.bench.everything import turned
 from charnerf.bench.grids import grid_share, hausdorff
 from charnerf.bench.headline import Comparison
+from charnerf.bench.hull_cut import cut_by_hull
 from charnerf.bench.kinds import KINDS
 from charnerf.bench.measure import in_turns
 from charnerf.bench.memory import resized
@@ -211,3 +213,28 @@ def test_settings_and_maps(tiny):
     again = PixelAligned.of(one.network.encode(one.views))
     torch.testing.assert_close(again.feature_maps, one.maps.feature_maps)
     assert replace(one, name="x").name == "x"
+
+
+def test_the_hull_cuts_nothing_of_what_it_was_carved_from(person_views):
+    model = tiny_models.tiny_model(features="image_hull").eval()
+    camera = helpers.target_cameras(4, size=24)[1]
+    picture = helpers.photograph(helpers.person(symmetric=False), helpers.target_cameras(4, size=24)[1:2])[0]
+    (row,) = cut_by_hull(model, [Pictured("person", person_views, camera, picture)])
+    assert row["pixels shown"] == int((picture[..., 3] > 0.5).sum()) > 20
+    assert row["cut"] == 0
+    moved = replace(camera, world_from_camera=camera.world_from_camera.clone())
+    moved.world_from_camera[2, 3] += 2.0  # the picture does not belong to this camera
+    (wrong,) = cut_by_hull(model, [Pictured("person", person_views, moved, picture)])
+    assert wrong["cut"] > 0
+
+
+def test_a_turntable_s_camera_goes_round(person_views):
+    camera = helpers.target_cameras(4, size=24)[1]
+    quarter = turned(camera, 0.5 * math.pi)
+    centre = camera.world_from_camera[:3, 3]
+    assert torch.allclose(quarter.world_from_camera[2, 3], centre[2])
+    assert torch.allclose(quarter.world_from_camera[:2, 3].norm(), centre[:2].norm())
+    assert abs(float(quarter.world_from_camera[:2, 3] @ centre[:2])) < 1e-4
+    assert torch.allclose(
+        turned(quarter, 1.5 * math.pi).world_from_camera, camera.world_from_camera, atol=1e-5
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,6 +15,8 @@ from torch.nn import functional as F
 
 from charnerf.bench.architectures import architecture_rows, large_network, step_at_scale
 from charnerf.bench.headline import ADAPTIVE, NUM_PIXELS, Workbench
+from charnerf.bench.hull_cut import cut_by_hull
+from charnerf.bench.memory import peak_memory
 from charnerf.bench.meshes import mesh_rows
 from charnerf.bench.plots import plot_growth, plot_work_precision
 from charnerf.bench.rendering import BASELINE, measure
@@ -27,9 +30,10 @@ from charnerf.bench.sweeps import (
     trick_methods,
 )
 from charnerf.model_api import Model
-from charnerf.types import SourceViews
+from charnerf.types import Cameras, SourceViews
 
 FRAMES = 36
+MEMORY_SIDES = (128, 256, 512)
 SOURCE_SIDES = (32, 64, 96, 128, 192)
 
 
@@ -83,6 +87,10 @@ def all_sweeps(
     grown = growths(bench, subjects[0], pictured, _more_views(subjects[0]))
     result["scaling"] = [one.as_dict() for one in grown]
     plot_growth(result["scaling"], output / "scaling.png")
+    say("memory by size")
+    result["memory_growth"] = _memory_growth(bench, pictured[0])
+    say("what the hull cuts away")
+    result["cut_by_hull"] = cut_by_hull(bench.network, pictured)
     return result
 
 
@@ -147,8 +155,8 @@ def _turntable(one: Subject, bench: Workbench) -> dict[str, Any]:
     start = time.perf_counter()
     with torch.no_grad():
         scene = one.network.scene(one.network.encode(one.views), 0)
-        for _ in range(FRAMES):
-            adaptive.render_camera(scene, one.camera)
+        for frame in range(FRAMES):
+            adaptive.render_camera(scene, turned(one.camera, 2.0 * math.pi * frame / FRAMES))
     ours = time.perf_counter() - start
     timed = measure(one, {}, torch.ones_like(one.truth, dtype=torch.float64), repeats=1)[BASELINE]
     theirs = FRAMES * one.camera.width * one.camera.height / timed.rays_per_second
@@ -159,6 +167,24 @@ def _turntable(one: Subject, bench: Workbench) -> dict[str, Any]:
         "baseline_seconds_by_its_rays_a_second": theirs,
         "speedup": theirs / ours,
     }
+
+
+def turned(camera: Cameras, angle: float) -> Cameras:
+    """The camera carried round the vertical axis by an angle, rad."""
+    turn = torch.eye(4, dtype=camera.focal.dtype, device=camera.focal.device)
+    turn[0, 0] = turn[1, 1] = math.cos(angle)
+    turn[1, 0], turn[0, 1] = math.sin(angle), -math.sin(angle)
+    return replace(camera, world_from_camera=turn @ camera.world_from_camera)
+
+
+def _memory_growth(bench: Workbench, pictured: Pictured) -> list[dict[str, Any]]:
+    """Rise of resident memory by image side and grid side, each in a fresh process."""
+    rows = []
+    for work in ("render", "mesh"):
+        for side in MEMORY_SIDES:
+            found = peak_memory(work, bench.network, bench.renderers[ADAPTIVE], pictured, size=side)
+            rows.append({"work": work, "side": side, "rise MiB": found.rise_mib, "seconds": found.seconds})
+    return rows
 
 
 def _more_views(one: Subject) -> SourceViews:

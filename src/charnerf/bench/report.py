@@ -68,6 +68,11 @@ def report(result: dict[str, Any]) -> str:
                 for one in result["scaling"]
             ]
         ),
+        "Peak memory over the loaded model, a fresh process each:",
+        _rows(result["memory_growth"]),
+        "## What the hull cuts away",
+        "Pixels of one whole target picture that show the character, and those of them whose rays meet no cell of its hull.",
+        _rows(result["cut_by_hull"]) if result["cut_by_hull"] else "The model has no hull.",
     ]
     return "\n\n".join(parts) + "\n"
 

@@ -6,6 +6,7 @@ from typing import Any
 from charnerf import runs
 from charnerf.bench.headline import ADAPTIVE, CULLED, DENSE, Workbench
 from charnerf.bench.subjects import untrained_like
+from charnerf.config.composition import compose_config
 from charnerf.model_api import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
@@ -14,7 +15,7 @@ from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
 WIDE = 512
-BATCH_RAYS, TRAIN_SAMPLES = 512, 8  # of scale=small
+TRAINING_SCALE = "small"
 TOLERANCE = 0.05  # of conf/renderer/adaptive.yaml
 CHUNK_SHARE = 0.125  # of the memory budget, for one chunk of points
 
@@ -29,7 +30,8 @@ def workbench(model: Model, *, memory_mib: float, tolerance: float = TOLERANCE) 
     """
     like = settings_of(model.renderer)
     like["memory_mib"] = CHUNK_SHARE * memory_mib
-    in_training = {**like, "num_coarse": min(TRAIN_SAMPLES, like["num_coarse"])}
+    scale = compose_config([f"scale={TRAINING_SCALE}"]).scale
+    in_training = {**like, "num_coarse": int(scale.train_num_coarse)}
     return Workbench(
         network=model.network,
         wide=resized_network(model, WIDE),
@@ -40,7 +42,7 @@ def workbench(model: Model, *, memory_mib: float, tolerance: float = TOLERANCE) 
             DENSE: DenseRenderer(**like),
         },
         training={CULLED: CulledRenderer(**in_training), DENSE: DenseRenderer(**in_training)},
-        batch_rays=BATCH_RAYS,
+        batch_rays=int(scale.phase_rays[0]),
         memory_mib=memory_mib,
         image_size=model.image_size,
     )
