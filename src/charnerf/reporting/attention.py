@@ -22,7 +22,7 @@ from charnerf.reporting.rows import Row, Run, data_root
 
 CHARACTERS = 2
 _TARGET = "view_attention.ViewAttention"
-_X = "azimuth of the query, degrees (0 front, 90 left side, 180 back)"
+_X = "azimuth of the query, degrees"
 _THEORY = "cos x + cos(x - 90) + cos(x - 180), scaled"
 
 

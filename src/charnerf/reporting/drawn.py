@@ -27,6 +27,10 @@ from charnerf.types import SourceViews
 
 VIEWS = {"front": 0.0, "side": SIDES["left"], "back": 180.0}  # azimuth
 SHOWN = (30.0, 150.0)  # azimuths rendered
+ROUNDNESS, THICKEST = (
+    0.7,
+    0.3,
+)  # of a guessed side: depth over width, and the width of a trunk over the height
 PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 _MASK, _COLOURS = "_mask", "_texture"
 
@@ -73,7 +77,8 @@ def find_drawings(folder: Path) -> list[DrawnCharacter]:
 def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]:
     """Source views (B = 1) of what is drawn, and what was assumed about the rest.
 
-    A back that is not drawn is taken to be the mirrored front, whose outline it has; a side that is not drawn is left out.
+    A back that is not drawn is taken to be the mirrored front, whose outline it has; a side that is not drawn is guessed from the
+    front: without one, nothing would bound the depth.
 
     Raises:
         DataError: If a picture can not be read or shows no figure.
@@ -82,7 +87,9 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
     told = "" if len(cut) == len(VIEWS) else f"drawn: {', '.join(cut)}"
     if "back" not in cut:
         cut["back"] = cut["front"][:, ::-1].copy()
-    names = [view for view in VIEWS if view in cut]
+    if "side" not in cut:
+        cut["side"] = guessed_side(cut["front"])
+    names = list(VIEWS)
     boxes = [figure_box(cut[view][..., 3], f"{character.name}, {view}") for view in names]
     extent = half_extent([(cut[view][..., 3], box) for view, box in zip(names, boxes, strict=True)])
     canvases = [
@@ -96,6 +103,25 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
         mirrored=flags.clone(),
     )
     return views, told
+
+
+def guessed_side(front: np.ndarray) -> np.ndarray:
+    """A side view for a front without one, floats (H, W, 4): in every row as deep as ROUNDNESS of its widest part is wide.
+
+    Parts that reach out, such as arms, are taken to be no deeper than a trunk may be. The colour is the row's median.
+    """
+    side = np.zeros_like(front)
+    seen = front[..., 3] > 0.5
+    most = THICKEST * int(seen.any(1).sum())
+    centre = 0.5 * front.shape[1]
+    for row in np.flatnonzero(seen.any(1)):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], seen[row], [False])).astype(np.int8)))
+        widest = float((edges[1::2] - edges[::2]).max())
+        reach = max(0.5, 0.5 * ROUNDNESS * min(widest, most))
+        columns = slice(max(0, int(centre - reach + 0.5)), int(centre + reach + 0.5))
+        side[row, columns, :3] = np.median(front[row, seen[row], :3], axis=0)
+        side[row, columns, 3] = 1.0
+    return side
 
 
 def drawn_matrix(
@@ -126,8 +152,8 @@ def drawn_matrix(
         path = save_matrix(folder / "report_drawings.png", [*VIEWS, *models], lines)
         blocks.append(Picture(path, "Drawings through every row, seen from azimuth 30 and 150 degrees"))
     told = (
-        "No truth exists for these. A back that is not drawn is the mirrored front; a side that is not drawn is left out, so that"
-        " nothing bounds the depth. Their licences are told where they lie, not here."
+        "No truth exists for these. A back that is not drawn is the mirrored front, a side that is not drawn a guess from the"
+        " front's widths: both are shown as the models got them. Their licences are told where they lie, not here."
     )
     return [*blocks, Text(told), *(Text(problem) for problem in problems)]
 
@@ -144,18 +170,16 @@ def _lines(
             given[size] = drawn_views(character, size)
         heroes.append(model.encode_views(given[size][0]))
     views, told = given[max(given)]
-    names = [view for view in VIEWS if view in character.files or view == "back"]
-    shown = {
-        view: from_floats(image.permute(1, 2, 0).numpy())
-        for view, image in zip(names, views.images[0], strict=True)
-    }
+    shown: list[Image.Image | None] = [
+        from_floats(image.permute(1, 2, 0).numpy()) for image in views.images[0]
+    ]
     lines: list[tuple[str, list[Image.Image | None]]] = []
     for azimuth in SHOWN:
         pictures = [
             from_floats(hero.render(azimuth_deg=azimuth, elevation_deg=10.0, size=CELL)) for hero in heroes
         ]
-        first: list[Image.Image | None] = [None if lines else shown.get(view) for view in VIEWS]
-        lines.append((f"{character.name}\n{azimuth:.0f}°\n{'' if lines else told}", [*first, *pictures]))
+        label = f"{character.name}\n{azimuth:.0f}°\n{'' if lines else told}"
+        lines.append((label, [*([None] * len(shown) if lines else shown), *pictures]))
     return lines
 
 

@@ -146,8 +146,12 @@ def plot_lines(panels: Mapping[str, Mapping[str, Sequence[Line]]], path: Path, *
             for number, (xs, ys) in enumerate(lines):
                 axes.plot(xs, ys, **look, marker="o", markersize=2.5, label=row if number == 0 else None)
         _tidy(axes, x=x, y=title)
-    handles, labels = every[0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=8, loc="outside lower center", ncols=4)
+    shown = {
+        label: line for axes in every for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        list(shown.values()), list(shown), frameon=False, fontsize=8, loc="outside lower center", ncols=5
+    )
     return _save(figure, path)
 
 
