@@ -1,7 +1,7 @@
 """views.csv of a run: the metrics of every view, by method, character and angle."""
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -66,8 +66,3 @@ def read_views(path: Path) -> ViewTable:
 def _view(row: dict[str, str]) -> View:
     numbers = {key: float(cell) for key, cell in row.items() if key not in _WORDS and cell != ""}
     return View(row["method"], row["character"], row["view"], numbers)
-
-
-def in_bins(values: Sequence[float], edges: Sequence[float]) -> list[int]:
-    """Bin of each value: edges[i] <= value < edges[i + 1], the last one closed."""
-    return [sum(value >= edge for edge in edges[1:-1]) for value in values]
