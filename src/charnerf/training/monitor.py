@@ -38,9 +38,12 @@ class BudgetBar(L.Callback):
         """Open the bar."""
         by_steps = self.clock.budget_seconds is None
         total = self.clock.budget_steps if by_steps else self.clock.budget_seconds
+        done = (
+            self.clock.steps if by_steps else self.clock.seconds
+        )  # of a resumed run; rounded up, time left is negative
         self.bar = tqdm(
             total=round(total or 0),
-            initial=self.clock.steps if by_steps else round(self.clock.seconds),  # of a resumed run
+            initial=done,
             desc="training",
             unit="step" if by_steps else "s",
             bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} {unit}, left {remaining}{postfix}",
