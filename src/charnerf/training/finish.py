@@ -11,6 +11,7 @@ from omegaconf import DictConfig
 
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
+from charnerf.errors import NumericalError
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
@@ -67,22 +68,7 @@ def finish_run(
     size = sum(parameter.numel() for parameter in model.parameters())
     write_metrics(folder / "metrics.json", {**metrics, "num_parameters": size, "steps": trainer.global_step})
     first = names_of(read_dataset(root), cfg.sampling.test_split)[0]
-    with torch.no_grad():
-        sources = load_character(root, first).sources.to(device)
-        scene = model.scene(model.encode(sources), 0)
-        built = build_mesh(scene, sources, resolution=MESH_RESOLUTION)
-    (folder / "meshes").mkdir(exist_ok=True)
-    save_mesh(built.mesh, folder / "meshes" / f"{first}.glb")
-    colours = vertex_colours(built.mesh)
-    if isinstance(trainer.logger, TensorBoardLogger) and colours is not None:
-        trainer.logger.experiment.add_mesh(
-            f"mesh/{first}",
-            vertices=torch.from_numpy(np.asarray(built.mesh.vertices, dtype=np.float32)[None]),
-            colors=torch.from_numpy(colours[None, :, :3].copy()),
-            faces=torch.from_numpy(np.asarray(built.mesh.faces, dtype=np.int64)[None]),
-            global_step=trainer.global_step,
-        )
-        trainer.logger.finalize("success")
+    write_first_mesh(folder, root, first, model, trainer)
     report = write_run_report(folder)
     beside = metrics["baselines"]["visual_hull"]
     log.info(
@@ -90,3 +76,28 @@ def finish_run(
         *(found[key] for found in (metrics, beside) for key in ("psnr", "psnr_foreground", "ssim")),
         report,
     )
+
+
+def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, trainer: L.Trainer) -> None:
+    """Write one character's mesh, into TensorBoard too; says so where the field has no surface."""
+    device = next(model.parameters()).device
+    with torch.no_grad():
+        sources = load_character(root, name).sources.to(device)
+        scene = model.scene(model.encode(sources), 0)
+        try:
+            built = build_mesh(scene, sources, resolution=MESH_RESOLUTION)
+        except NumericalError as error:  # too thin for a surface: the figures count all the same
+            log.warning("No mesh of %s: %s", name, error)
+            return
+    (folder / "meshes").mkdir(exist_ok=True)
+    save_mesh(built.mesh, folder / "meshes" / f"{name}.glb")
+    colours = vertex_colours(built.mesh)
+    if isinstance(trainer.logger, TensorBoardLogger) and colours is not None:
+        trainer.logger.experiment.add_mesh(
+            f"mesh/{name}",
+            vertices=torch.from_numpy(np.asarray(built.mesh.vertices, dtype=np.float32)[None]),
+            colors=torch.from_numpy(colours[None, :, :3].copy()),
+            faces=torch.from_numpy(np.asarray(built.mesh.faces, dtype=np.int64)[None]),
+            global_step=trainer.global_step,
+        )
+        trainer.logger.finalize("success")
