@@ -43,7 +43,7 @@ def test_the_run_folder_is_complete(run_folder):
     """As design.md lays it out; what tells of the run agrees with itself."""
     for name in (
         "config.yaml", "checkpoints/last.ckpt", "checkpoints/best.ckpt", "weights.safetensors", "tensorboard",
-        "curve.csv", "metrics.json", "images", "meshes/twin.glb", "report.md",
+        "curve.csv", "metrics.json", "images", "meshes/twin.glb", "meshes/twin_sheet.png", "report.md",
     ):  # fmt: skip
         assert (run_folder / name).exists(), name
     metrics = json.loads((run_folder / "metrics.json").read_text())

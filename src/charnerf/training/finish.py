@@ -18,6 +18,7 @@ from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.extract import vertex_colours
+from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Scene, SourceViews
