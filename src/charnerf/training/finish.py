@@ -92,6 +92,7 @@ def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, train
             return
     (folder / "meshes").mkdir(exist_ok=True)
     save_mesh(built.mesh, folder / "meshes" / f"{name}.glb")
+    contact_sheet(built.mesh, sources).save(folder / "meshes" / f"{name}_sheet.png")
     colours = vertex_colours(built.mesh)
     if isinstance(trainer.logger, TensorBoardLogger) and colours is not None:
         trainer.logger.experiment.add_mesh(
