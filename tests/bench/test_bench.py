@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from torch.utils.flop_counter import FlopCounterMode
 
 import helpers
 import tiny_models
@@ -20,7 +21,7 @@ from charnerf.bench.kinds import KINDS
 from charnerf.bench.measure import in_turns
 from charnerf.bench.memory import resized
 from charnerf.bench.rendering import BASELINE, measure
-from charnerf.bench.roofline import roofline
+from charnerf.bench.roofline import IN_PLACE, roofline
 from charnerf.bench.scaling import exponent, grow
 from charnerf.bench.subjects import Pictured, Subject, pixels_psnr, reference, subject, untrained_like
 from charnerf.bench.sweeps import Row, pareto
@@ -156,6 +157,14 @@ def test_arithmetic_is_counted(tiny):
     points = 48 * 16
     assert 0 < found.gflop * 1e9 < points * 4e6
     assert found.share == pytest.approx(found.achieved_gflops / found.peak_gflops)
+
+
+def test_products_that_add_in_place_count(tiny):
+    a, b, total = torch.ones(10, 20), torch.ones(20, 30), torch.ones(10, 30)
+    with FlopCounterMode(display=False, custom_mapping=IN_PLACE) as counter:
+        total.addmm_(a, b)
+        torch.addmm(total, a, b)
+    assert counter.get_total_flops() == 2 * 2 * 10 * 20 * 30
 
 
 def test_training_steps_lower_their_loss(tiny):

@@ -14,14 +14,13 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from charnerf.bench.architectures import architecture_rows, large_network, step_at_scale
-from charnerf.bench.headline import ADAPTIVE, NUM_PIXELS, Workbench
-from charnerf.bench.hull_cut import cut_by_hull
+from charnerf.bench.headline import ADAPTIVE, NUM_PIXELS, Prepared, Workbench
 from charnerf.bench.memory import peak_memory
 from charnerf.bench.meshes import mesh_rows
 from charnerf.bench.plots import plot_growth, plot_work_precision
 from charnerf.bench.rendering import BASELINE, measure
 from charnerf.bench.scaling import growths
-from charnerf.bench.subjects import Pictured, Subject, reference, subject, subjects_by_kind, untrained_like
+from charnerf.bench.subjects import Pictured, Subject, subject
 from charnerf.bench.sweeps import (
     compiled_methods,
     precision_methods,
@@ -29,7 +28,6 @@ from charnerf.bench.sweeps import (
     sweep,
     trick_methods,
 )
-from charnerf.model_api import Model
 from charnerf.types import Cameras, SourceViews
 
 FRAMES = 36
@@ -38,23 +36,22 @@ SOURCE_SIDES = (32, 64, 96, 128, 192)
 
 
 def all_sweeps(
-    model: Model,
     bench: Workbench,
     pictured: Sequence[Pictured],
+    prepared: Prepared,
     output: Path,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
     """Run every sweep; plots go to `output`.
 
     Args:
-        model: The trained model.
-        bench: Its networks and renderers.
+        bench: Networks and renderers.
         pictured: Characters.
+        prepared: The same with references.
         output: Folder for plots.
         say: Told what is being done.
     """
-    subjects = [subject(one, model.network, kind="character", num_pixels=NUM_PIXELS) for one in pictured]
-    references = [reference(one) for one in subjects]
+    subjects, references = [list(some) for some in zip(*prepared.characters, strict=True)]
     result: dict[str, Any] = {}
     for name, methods in (
         ("samples", sample_methods(bench)),
@@ -67,7 +64,7 @@ def all_sweeps(
         rows = sweep(methods, some, references, repeats=3)
         plot_work_precision(rows, output / f"{name}.png", title=f"{name}: {NUM_PIXELS} pixels a character")
         result[f"sweep_{name}"] = [row.as_dict() for row in rows]
-    result["sweep_kinds"] = _kinds(model, bench, output, say)
+    result["sweep_kinds"] = _kinds(bench, prepared, output, say)
     say("source resolution")
     result["source_resolution"] = _resolutions(pictured[0], bench, references[0])
     say("builds")
@@ -89,20 +86,15 @@ def all_sweeps(
     plot_growth(result["scaling"], output / "scaling.png")
     say("memory by size")
     result["memory_growth"] = _memory_growth(bench, pictured[0])
-    say("what the hull cuts away")
-    result["cut_by_hull"] = cut_by_hull(bench.network, pictured)
     return result
 
 
-def _kinds(model: Model, bench: Workbench, output: Path, say: Callable[[str], None]) -> dict[str, Any]:
+def _kinds(bench: Workbench, prepared: Prepared, output: Path, say: Callable[[str], None]) -> dict[str, Any]:
     """The sweep of samples on every kind of scene, a diagram each."""
     found = {}
-    kinds = subjects_by_kind(
-        model.network, untrained_like(model.network), size=bench.image_size, num_pixels=NUM_PIXELS
-    )
-    for one in kinds:
+    for one, truth in prepared.kinds:
         say(f"kind: {one.kind}")
-        rows = sweep(sample_methods(bench), [one], [reference(one)], repeats=1)
+        rows = sweep(sample_methods(bench), [one], [truth], repeats=1)
         file = f"kind_{one.kind.replace(' ', '_')}.png"
         plot_work_precision(rows, output / file, title=one.kind)
         found[one.kind] = [row.as_dict() for row in rows]

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+from torch import Tensor
+
 from charnerf.bench.grids import GridShare, grid_share
 from charnerf.bench.memory import peak_memory
 from charnerf.bench.rendering import BASELINE, Measured, measure
@@ -68,26 +70,46 @@ class Comparison:
         }
 
 
-def quick(bench: Workbench, pictured: Sequence[Pictured], say: Callable[[str], None]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Prepared:
+    """Characters and kinds of scene, each with its converged colours (R, 3)."""
+
+    characters: list[tuple[Subject, Tensor]]
+    kinds: list[tuple[Subject, Tensor]]
+
+
+def prepare(bench: Workbench, pictured: Sequence[Pictured], say: Callable[[str], None]) -> Prepared:
+    """Encode characters and kinds of scene, choose their pixels, and compute what all errors are measured against."""
+    say("converged references")
+    characters = [
+        subject(one, bench.network, kind="character", num_pixels=NUM_PIXELS, seed=i)
+        for i, one in enumerate(pictured)
+    ]
+    fog = untrained_like(bench.network)
+    kinds = subjects_by_kind(bench.network, fog, size=bench.image_size, num_pixels=NUM_PIXELS)
+    return Prepared(
+        characters=[(one, reference(one)) for one in characters],
+        kinds=[(one, reference(one)) for one in kinds],
+    )
+
+
+def quick(
+    bench: Workbench, pictured: Sequence[Pictured], prepared: Prepared, say: Callable[[str], None]
+) -> dict[str, Any]:
     """Measure the headline and the kinds of scene; under five minutes on two cores.
 
     Args:
         bench: What is measured.
         pictured: Characters, drawings and a target picture each.
+        prepared: The same with references.
         say: Told what is being done.
     """
-    say("characters")
-    subjects = [
-        subject(one, bench.network, kind="character", num_pixels=NUM_PIXELS, seed=i)
-        for i, one in enumerate(pictured)
-    ]
     chosen = {name: bench.renderers[name] for name in (CULLED, ADAPTIVE)}
-    compared = [Comparison(one, measure(one, chosen, reference(one), repeats=3)) for one in subjects]
+    subjects = [one for one, _ in prepared.characters]
+    say("characters")
+    compared = [Comparison(one, measure(one, chosen, truth, repeats=3)) for one, truth in prepared.characters]
     say("kinds of scene")
-    kinds = subjects_by_kind(
-        bench.network, untrained_like(bench.network), size=bench.image_size, num_pixels=NUM_PIXELS
-    )
-    by_kind = [Comparison(one, measure(one, chosen, reference(one), repeats=2)) for one in kinds]
+    by_kind = [Comparison(one, measure(one, chosen, truth, repeats=2)) for one, truth in prepared.kinds]
     say("training steps")
     steps = step_timings(
         subjects[0],

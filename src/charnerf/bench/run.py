@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from charnerf.bench.everything import all_sweeps
-from charnerf.bench.headline import ADAPTIVE, CULLED, NUM_PIXELS, quick
+from charnerf.bench.headline import ADAPTIVE, CULLED, NUM_PIXELS, prepare, quick
+from charnerf.bench.hull_cut import cut_by_hull
 from charnerf.bench.report import report
 from charnerf.bench.roofline import roofline
 from charnerf.bench.subjects import Pictured, embedded, of_dataset, subject
@@ -28,8 +29,9 @@ def run_quick(
     split: str,
     memory_mib: float,
     say: Callable[[str], None],
+    output: Path | None = None,
 ) -> dict[str, Any]:
-    """Measure the headline.
+    """Measure the headline, and all sweeps where there is a folder for their plots.
 
     Args:
         model: The trained model.
@@ -37,6 +39,7 @@ def run_quick(
         split: Of the data set.
         memory_mib: Budget.
         say: Told what is being done, with seconds.
+        output: Folder for plots; None for the headline alone.
     """
     start = time.perf_counter()
 
@@ -44,11 +47,19 @@ def run_quick(
         say(f"{time.perf_counter() - start:6.1f} s  {text}")
 
     tell("capturing")
+    bench = workbench(model, memory_mib=memory_mib)
     pictured = _characters(model, data, split, NUM_CHARACTERS)
-    result = quick(workbench(model, memory_mib=memory_mib), pictured, tell)
+    prepared = prepare(bench, pictured, tell)
+    result = quick(bench, pictured, prepared, tell)
+    if output is not None:
+        result |= all_sweeps(bench, pictured, prepared, output, tell)
+        tell("what the hull cuts away")
+        every = pictured if data is None else of_dataset(data, split, None)
+        result["cut_by_hull"] = cut_by_hull(model.network, every)
     tell("done")
     result["environment"] = environment(model.device)
     result["weights"] = model.source.name
+    result["data"] = "embedded" if data is None else f"{data.name}, split {split}"
     result["seconds"] = time.perf_counter() - start
     return result
 
@@ -83,10 +94,7 @@ def run_full(
     say: Callable[[str], None],
 ) -> dict[str, Any]:
     """Measure the headline and all sweeps; plots, bench.json and bench.md go to `output`; arguments as `run_quick`."""
-    result = run_quick(model, data=data, split=split, memory_mib=memory_mib, say=say)
-    bench = workbench(model, memory_mib=memory_mib)
-    pictured = _characters(model, data, split, NUM_CHARACTERS)
-    result |= all_sweeps(model, bench, pictured, output, say)
+    result = run_quick(model, data=data, split=split, memory_mib=memory_mib, say=say, output=output)
     write_json(output / "bench.json", result)
     (output / "bench.md").write_text(report(result), encoding="utf-8")
     return result

@@ -85,8 +85,8 @@ def captured(name: str, scene: trimesh.Scene, size: int) -> Pictured:
     return Pictured(name, views, pictures.cameras[TARGET_VIEWS - 1].to(torch.float32), picture)
 
 
-def of_dataset(root: Path, split: str, count: int) -> list[Pictured]:
-    """The first characters of a split of a data set."""
+def of_dataset(root: Path, split: str, count: int | None) -> list[Pictured]:
+    """The first characters of a split of a data set, all if there is no count."""
     found = []
     for name in names_of(read_dataset(root), split)[:count]:
         character = load_character(root, name)

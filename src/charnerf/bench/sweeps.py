@@ -25,6 +25,7 @@ Method = Callable[[Subject], Callable[[], Any]]
 SAMPLES = (4, 8, 16, 32, 64, 128)
 DENSE_SAMPLES = (4, 8, 16, 32)
 BASELINE_SAMPLES = ((16, 8), (32, 16), (64, 32), (128, 64))
+SLOW_SECONDS = 1.0  # of a method's turns in sum, after which it takes no further one
 TOLERANCES = (0.2, 0.1, 0.05, 0.02, 0.01)
 
 
@@ -70,7 +71,7 @@ def sweep(
     for subject, truth in zip(subjects, references, strict=True):
         with torch.no_grad():
             calls = {"\n".join(key): method(subject) for key, method in methods.items()}
-            timings = in_turns(calls, repeats=repeats, device=subject.truth.device)
+            timings = in_turns(calls, repeats=repeats, device=subject.truth.device, most_seconds=SLOW_SECONDS)
         for name, timing in timings.items():
             curve, setting = name.split("\n")
             answer = timing.answer.finest.rgb if isinstance(timing.answer, Rendering) else timing.answer.rgb
