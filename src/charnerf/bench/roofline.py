@@ -7,13 +7,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import torch
-from torch.utils.flop_counter import FlopCounterMode, addmm_flop
+from torch.utils.flop_counter import FlopCounterMode
 
 from charnerf.bench.subjects import Subject
 from charnerf.evaluation.timing import synchronize
 from charnerf.volume.renderers.base import AbstractRenderer
 
-IN_PLACE = {torch.ops.aten.addmm_: addmm_flop}  # products that add in place: torch counts only the others
+
+def _flop_of_product(total: torch.Size, first: torch.Size, second: torch.Size, **_: object) -> int:
+    """Arithmetic of `total.addmm_(first, second)` by the shapes."""
+    return 2 * first[0] * first[1] * second[1]
+
+
+IN_PLACE = {torch.ops.aten.addmm_: _flop_of_product}  # torch counts only products that are not in place
 
 
 @dataclass(frozen=True)
