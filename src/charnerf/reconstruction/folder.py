@@ -20,7 +20,7 @@ from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.model_api import HEIGHT, TEXTURE_SIZE, Model, TextureKind
 from charnerf.reconstruction.progress import BAR, meter
-from charnerf.reconstruction.report import report_text
+from charnerf.reconstruction.report import mesh_sentences, mesh_words, report_text
 from charnerf.reconstruction.turntable import on_white, render_around, write_film
 
 MOST_VIEWS = 12
@@ -127,6 +127,8 @@ def reconstruct(
             on_points=meter(bar, (resolution,), MESH_STEPS),
         )
         bar.update((bar.total or 0) - bar.n)
+    for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
+        sys.stderr.write(f"{line}\n")
     seconds = {
         "encode": encoded - start,
         **({} if refined is None else {"refine": ready - encoded}),
