@@ -51,7 +51,11 @@ class RunClock(L.Callback):
 
     def on_train_epoch_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Go on counting."""
-        self._running_since = time.perf_counter()
+        self._go_on()
+
+    def on_train_batch_start(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
+        """Go on counting where no epoch starts: after a resume in the middle of one."""
+        self._go_on()
 
     def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
         """Count the step; stop at the end of the budget."""
@@ -66,6 +70,10 @@ class RunClock(L.Callback):
     def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Nor is what happens between epochs."""
         self.pause()
+
+    def _go_on(self) -> None:
+        if self._running_since is None:
+            self._running_since = time.perf_counter()
 
     def state_dict(self) -> dict[str, Any]:
         """What a resumed run goes on from."""
