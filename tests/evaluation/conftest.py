@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from figures import write_figure
 
 

@@ -1,6 +1,5 @@
 import pytest
 import torch
-from figures import SIZE, figure, photograph, source_views, target_cameras
 
 from charnerf.evaluation import metrics
 from charnerf.evaluation.baselines import VisualHullBaseline, signed_edge_distances, white_prediction
@@ -8,6 +7,7 @@ from charnerf.evaluation.ray_mesh import RayMesh
 from charnerf.evaluation.scores import on_white
 from charnerf.evaluation.surface_error import seen_points, surface_scores
 from charnerf.types import SourceViews
+from figures import SIZE, figure, photograph, source_views, target_cameras
 
 
 @pytest.fixture(scope="module", params=["ball", "doll"])

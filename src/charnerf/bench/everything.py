@@ -70,7 +70,7 @@ def all_sweeps(
     say("builds")
     result["builds"] = architecture_rows(pictured[0], bench.like, num_pixels=NUM_PIXELS, repeats=3)
     say("pixelNeRF's size")
-    result["large_network"] = large_network(pictured[0], bench.like, repeats=1)
+    result["large_network"] = large_network(pictured[0], repeats=1)
     say("training steps")
     result["training_steps"] = [
         step_at_scale(pictured[0], "small", num_rays=512, repeats=3),
