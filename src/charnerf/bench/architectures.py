@@ -16,6 +16,7 @@ from charnerf.bench.measure import in_turns
 from charnerf.bench.rendering import BASELINE
 from charnerf.bench.subjects import Pictured, subject, untrained_like
 from charnerf.bench.training_step import batch_of, parameters_of, step_timings
+from charnerf.bench.workbench import settings_of
 from charnerf.config.composition import compose_config
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
@@ -94,9 +95,10 @@ def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
     }
 
 
-def step_at_scale(pictured: Pictured, scale: str, *, num_rays: int, repeats: int) -> dict[str, Any]:
-    """A training step at a scale, seeded weights: packed, dense, and as the baseline."""
+def step_at_scale(pictured: Pictured, scale: str, *, repeats: int) -> dict[str, Any]:
+    """A training step at a scale, seeded weights, the rays of its first phase: packed, dense, and as the baseline."""
     network, cfg = network_of((f"scale={scale}",))
+    num_rays = int(cfg.scale.phase_rays[0])
     renderer = runs.build_renderer(cfg)
     like = {**settings_of(renderer), "num_coarse": int(cfg.scale.train_num_coarse)}
     one = subject(pictured, network, kind=scale, num_pixels=num_rays)

@@ -158,4 +158,6 @@ def _read(maps: Tensor, shares: Tensor) -> Tensor:
     """Bilinear readings (P, V, C) of maps (V, C, h, w) at shares (V, P, 2) of the picture's sides."""
     grid = (2.0 * shares - 1.0)[:, :, None]
     read = F.grid_sample(maps, grid, mode="bilinear", padding_mode="border", align_corners=False)
-    return read[..., 0].permute(2, 0, 1)
+    return (
+        read[..., 0].permute(2, 0, 1).contiguous()
+    )  # else each point gets a copy of the next linear layer's weights

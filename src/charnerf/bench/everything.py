@@ -73,8 +73,8 @@ def all_sweeps(
     result["large_network"] = large_network(pictured[0], repeats=1)
     say("training steps")
     result["training_steps"] = [
-        step_at_scale(pictured[0], "small", num_rays=512, repeats=3),
-        step_at_scale(pictured[0], "base", num_rays=256, repeats=1),
+        step_at_scale(pictured[0], "small", repeats=3),
+        step_at_scale(pictured[0], "base", repeats=1),
     ]
     say("meshes")
     result["meshes"] = mesh_rows(subjects[0])

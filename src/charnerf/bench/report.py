@@ -14,7 +14,7 @@ def report(result: dict[str, Any]) -> str:
     parts = [
         "# Error against run time",
         f"`charnerf bench` on {machine['machine']}, {machine['threads']} threads, torch {machine['torch']}, "
-        f"{machine['device']}; weights {result['weights']}.",
+        f"{machine['device']}, {result['seconds'] / 60:.0f} minutes; weights {result['weights']}, characters: {result['data']}.",
         "## Headline",
         headline_table(result["headline"]),
         "\n".join(f"- `{name}`: {text}" for name, text in result["headline"]["how"].items()),
@@ -47,7 +47,8 @@ def report(result: dict[str, Any]) -> str:
         _rows(result["source_resolution"]),
         "## Builds",
         _rows(result["builds"]),
-        f"Width 512, {large['parameters']:,} parameters, seeded weights, {large['rays']} rays:",
+        f"`experiment=pixelnerf scale=paper`: {large['parameters']:,} parameters with its encoder ({large['encoder']}; "
+        f"pixelNeRF counts 13 million more that its ResNet never uses), seeded weights, {large['rays']} rays:",
         _rows(
             [
                 {"method": name, "seconds": s, "speed-up": large["speedup"][name]}
