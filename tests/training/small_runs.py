@@ -10,6 +10,7 @@ from omegaconf import DictConfig
 
 from charnerf.config.composition import compose_config
 from charnerf.data.datamodule import MixedDataModule
+from charnerf.models.matrix_products import use_fastest_products
 from charnerf.runs import build_model, build_part, build_renderer
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
@@ -63,6 +64,7 @@ class SmallRun:
 
 def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> SmallRun:
     """Everything that `run_training` builds before it trains."""
+    use_fastest_products()  # also where another test of the process has asked for it: the same numbers in every process
     L.seed_everything(cfg.seed, verbose=False)
     folder.mkdir(parents=True, exist_ok=True)
     model = build_model(cfg)

@@ -34,6 +34,16 @@ TRAINED = """
 """
 
 
+@pytest.fixture
+def _one_thread():
+    """As the other process has it: sums over several threads round otherwise."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.mark.usefixtures("_one_thread")
 def test_a_cell_killed_in_the_middle_ends_as_the_one_that_was_not(figure_dataset, tmp_path):
     """kill -9 while it trains: the next start goes on from its checkpoint, to the same weights bit by bit."""
     grid = tmp_path / "grid"
