@@ -24,6 +24,8 @@ def assert_equal_with_gradients(
         upstream = rand(*output.shape, 1)[..., 0]
         gradients.append(torch.autograd.grad((output * upstream).sum(), leaves))
         outputs.append(output)
+        with torch.no_grad():
+            assert torch.allclose(function(*inputs), output, rtol=0, atol=1e-12)
     assert torch.allclose(outputs[0], outputs[1], rtol=0, atol=1e-12)
     for ours, theirs in zip(*gradients, strict=True):
         assert ours.shape == theirs.shape

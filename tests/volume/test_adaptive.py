@@ -124,6 +124,17 @@ def test_what_nobody_sees_is_not_evaluated():
     assert 0 < asked == rendering.estimate.num_colours < 0.3 * rendering.estimate.num_samples
 
 
+def test_what_is_returned_may_enter_a_gradient():
+    scene, rays = scene_of(FIELDS["blob"]), rays_of()
+    with torch.no_grad():
+        rendering = adaptive(0.1).render(scene, rays)
+    gain = torch.ones(3, requires_grad=True)
+    assert rendering.estimate is not None
+    (gain * rendering.finest.rgb).sum().backward()
+    (gain[0] * (rendering.finest.opacity + rendering.estimate.estimated)).sum().backward()
+    assert gain.grad is not None and bool(gain.grad.isfinite().all())
+
+
 def test_an_empty_picture_asks_nothing():
     def fail(points: torch.Tensor, dirs: torch.Tensor) -> FieldOutput:
         raise AssertionError("asked")

@@ -19,6 +19,8 @@ def residual_rows(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> 
     """`x + relu(relu(x) W1' + b1) W2' + b2` of rows x (N, D)."""
     if torch.is_autocast_enabled(x.device.type):
         return x + F.linear(F.linear(x.relu(), w1, b1).relu(), w2, b2)
+    if not torch.is_grad_enabled():
+        return _residual(x, w1, b1, w2, b2)[0]
     return _Residual.apply(x, w1, b1, w2, b2)  # type: ignore[no-any-return, no-untyped-call]
 
 
@@ -26,6 +28,8 @@ def score_rows(x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor,
     """`relu(x W' + b + addend) w' + b_score` of rows x (N, D) with addends (N, H): one score each, (N,)."""
     if torch.is_autocast_enabled(x.device.type):
         return F.linear((F.linear(x, w, b) + addend).relu(), w_score, b_score)[:, 0]
+    if not torch.is_grad_enabled():
+        return _score(x, addend, w, b, w_score, b_score)[0]
     return _Score.apply(x, addend, w, b, w_score, b_score)  # type: ignore[no-any-return, no-untyped-call]
 
 
@@ -33,23 +37,47 @@ def sum_views(weights: Tensor, features: Tensor) -> Tensor:
     """Sum over the views of weights (P, V) times features (P, V, D): (P, D)."""
     if torch.is_autocast_enabled(features.device.type):
         return (weights[..., None] * features).sum(1)
+    if not torch.is_grad_enabled():
+        return _sum_views(weights, features)
     return _SumViews.apply(weights, features)  # type: ignore[no-any-return, no-untyped-call]
 
 
 def read_bags(rows: Tensor, indices: Tensor, weights: Tensor) -> Tensor:
     """Weighted sums of rows (N, C), indices and weights (Q, 4): (Q, C)."""
-    if weights.requires_grad:
+    if weights.requires_grad or not torch.is_grad_enabled():
         return F.embedding_bag(indices, rows, per_sample_weights=weights, mode="sum")
     return _Bags.apply(rows, indices, weights)  # type: ignore[no-any-return, no-untyped-call]
+
+
+def _residual(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The block's result, and what its gradient reads: both layers' inputs."""
+    rectified = x.relu()
+    hidden = torch.addmm(b1, rectified, w1.t()).relu_()
+    return torch.add(x, b2).addmm_(hidden, w2.t()), rectified, hidden
+
+
+def _score(
+    x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor, b_score: Tensor
+) -> tuple[Tensor, Tensor]:
+    """The scores, and what they are made of."""
+    hidden = torch.add(addend, b).addmm_(x, w.t()).relu_()
+    return torch.addmm(b_score, hidden, w_score.t())[:, 0], hidden
+
+
+def _sum_views(weights: Tensor, features: Tensor) -> Tensor:
+    """View by view: fewer passes over memory than a product and a sum, far fewer than a batched matrix product."""
+    total = features[:, 0] * weights[:, :1]
+    for view in range(1, features.shape[1]):
+        total.addcmul_(features[:, view], weights[:, view, None])
+    return total
 
 
 class _Residual(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> Tensor:
-        rectified = x.relu()
-        hidden = torch.addmm(b1, rectified, w1.t()).relu_()
+        result, rectified, hidden = _residual(x, w1, b1, w2, b2)
         ctx.save_for_backward(rectified, hidden, w1, w2)
-        return torch.add(x, b2).addmm_(hidden, w2.t())
+        return result
 
     @staticmethod
     @once_differentiable  # type: ignore[no-untyped-call, untyped-decorator]
@@ -65,9 +93,9 @@ class _Score(torch.autograd.Function):
     def forward(
         ctx: Any, x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor, b_score: Tensor
     ) -> Tensor:
-        hidden = torch.add(addend, b).addmm_(x, w.t()).relu_()
+        scores, hidden = _score(x, addend, w, b, w_score, b_score)
         ctx.save_for_backward(x, hidden, w, w_score)
-        return torch.addmm(b_score, hidden, w_score.t())[:, 0]
+        return scores
 
     @staticmethod
     @once_differentiable  # type: ignore[no-untyped-call, untyped-decorator]
@@ -82,11 +110,7 @@ class _SumViews(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, weights: Tensor, features: Tensor) -> Tensor:
         ctx.save_for_backward(weights, features)
-        # view by view: fewer passes over memory than a product and a sum, far fewer than a batched matrix product
-        total = features[:, 0] * weights[:, :1]
-        for view in range(1, features.shape[1]):
-            total.addcmul_(features[:, view], weights[:, view, None])
-        return total
+        return _sum_views(weights, features)
 
     @staticmethod
     @once_differentiable  # type: ignore[no-untyped-call, untyped-decorator]

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from charnerf.volume.compositing import weights_from_optical_depths
 
-DENSITY_SHARE = 0.15  # of the jump to a neighbour's density, taken as the error of a bin's mean density
+DENSITY_SHARE = 0.3  # of the jump to a neighbour's density, taken as the error of a bin's mean density
 COLOUR_SHARE = 0.2  # of the difference to a neighbour's colour, taken as the error of a bin's colour
 
 
