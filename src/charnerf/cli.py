@@ -268,9 +268,30 @@ def bench(
         Path | None, typer.Option("--json", metavar="FILE", dir_okay=False, help="Write all numbers there.")
     ] = None,
     output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For plots and tables."),
-    ] = Path("outputs/bench"),
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            file_okay=False,
+            help="For diagrams, tables and numbers, beside those measured before (outputs/bench; with --quick none).",
+        ),
+    ] = None,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--part", metavar="NAME", help="Only this part; may be repeated; a wrong name lists all of them."
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", dir_okay=False, help="Markdown file that gets the tables (DIR/bench.md)."
+        ),
+    ] = None,
+    note: Annotated[
+        str, typer.Option(metavar="TEXT", help="Stands beside the figures: what else the machine did, say.")
+    ] = "",
     data: Annotated[
         Path | None,
         typer.Option(
@@ -291,22 +312,16 @@ def bench(
 ) -> None:
     """Measure error against run time: speed-ups over a pixelNeRF-like evaluation, and what they cost.
 
-    Prints tables; DIR gets plots, bench.json and bench.md.
+    Prints tables; DIR gets diagrams, bench.json and bench.md after each part, so that parts can be measured one by one.
     """
     from charnerf import commands
+    from charnerf.bench.run import Request, chosen_parts
 
-    commands.bench(
-        weights,
-        output,
-        quick=quick,
-        roofline=roofline,
-        json_file=json_file,
-        data=data,
-        split=split,
-        memory_mib=memory,
-        device=device,
-        trust=trust or [],
-    )
+    parts = chosen_parts(["headline"] if quick and not part else part or [])
+    if output is None and not quick and not roofline:
+        output = Path("outputs/bench")
+    request = Request(parts, data, split, memory, output, page, note)
+    commands.bench(weights, request, roofline=roofline, json_file=json_file, device=device, trust=trust or [])
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import torch
 from omegaconf import OmegaConf
@@ -30,6 +30,9 @@ from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.reporting.report import report as write_report
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
+
+if TYPE_CHECKING:
+    from charnerf.bench.run import Request
 
 LIGHTS = {"unlit": Unlit, "headlight": Headlight}
 RENDERERS = {
@@ -301,14 +304,10 @@ def report(folder: Path, *, drawings: Path | None, trust: Sequence[str]) -> None
 
 def bench(
     weights: Path | None,
-    output: Path,
+    request: "Request",
     *,
-    quick: bool,
     roofline: bool,
     json_file: Path | None,
-    data: Path | None,
-    split: str,
-    memory_mib: float,
     device: str,
     trust: Sequence[str],
 ) -> None:
@@ -316,13 +315,7 @@ def bench(
     from charnerf.bench import run as benchmark
 
     model = load_model(weights, device=device, trust=trust)
-    setting = {"data": data, "split": split, "memory_mib": memory_mib, "say": say}
-    if roofline:
-        result = benchmark.run_roofline(model, **setting)  # type: ignore[arg-type]
-    elif quick:
-        result = benchmark.run_quick(model, **setting)  # type: ignore[arg-type]
-    else:
-        result = benchmark.run_full(model, output, **setting)  # type: ignore[arg-type]
+    result = (benchmark.run_roofline if roofline else benchmark.run)(model, request, say)
     if json_file is not None:
         benchmark.write_json(json_file, result)
     sys.stdout.write(benchmark.summary(result) + "\n")

@@ -70,46 +70,47 @@ class Comparison:
         }
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """Characters and kinds of scene, each with its converged colours (R, 3)."""
-
-    characters: list[tuple[Subject, Tensor]]
-    kinds: list[tuple[Subject, Tensor]]
+Referenced = tuple[Subject, Tensor]  # with its converged colours (R, 3)
 
 
-def prepare(bench: Workbench, pictured: Sequence[Pictured], say: Callable[[str], None]) -> Prepared:
-    """Encode characters and kinds of scene, choose their pixels, and compute what all errors are measured against."""
-    say("converged references")
-    characters = [
+def prepared_characters(bench: Workbench, pictured: Sequence[Pictured]) -> list[Referenced]:
+    """Encode characters, choose their pixels, and compute what all errors are measured against."""
+    subjects = [
         subject(one, bench.network, kind="character", num_pixels=NUM_PIXELS, seed=i)
         for i, one in enumerate(pictured)
     ]
+    return [(one, reference(one)) for one in subjects]
+
+
+def prepared_kinds(bench: Workbench) -> list[Referenced]:
+    """The same of every kind of scene."""
     fog = untrained_like(bench.network)
     kinds = subjects_by_kind(bench.network, fog, size=bench.image_size, num_pixels=NUM_PIXELS)
-    return Prepared(
-        characters=[(one, reference(one)) for one in characters],
-        kinds=[(one, reference(one)) for one in kinds],
-    )
+    return [(one, reference(one)) for one in kinds]
 
 
 def quick(
-    bench: Workbench, pictured: Sequence[Pictured], prepared: Prepared, say: Callable[[str], None]
+    bench: Workbench,
+    pictured: Sequence[Pictured],
+    characters: Sequence[Referenced],
+    kinds: Sequence[Referenced],
+    say: Callable[[str], None],
 ) -> dict[str, Any]:
     """Measure the headline and the kinds of scene; under five minutes on two cores.
 
     Args:
         bench: What is measured.
         pictured: Characters, drawings and a target picture each.
-        prepared: The same with references.
+        characters: The same with references.
+        kinds: Kinds of scene with references.
         say: Told what is being done.
     """
     chosen = {name: bench.renderers[name] for name in (CULLED, ADAPTIVE)}
-    subjects = [one for one, _ in prepared.characters]
+    subjects = [one for one, _ in characters]
     say("characters")
-    compared = [Comparison(one, measure(one, chosen, truth, repeats=3)) for one, truth in prepared.characters]
+    compared = [Comparison(one, measure(one, chosen, truth, repeats=3)) for one, truth in characters]
     say("kinds of scene")
-    by_kind = [Comparison(one, measure(one, chosen, truth, repeats=2)) for one, truth in prepared.kinds]
+    by_kind = [Comparison(one, measure(one, chosen, truth, repeats=2)) for one, truth in kinds]
     say("training steps")
     steps = step_timings(
         subjects[0],

@@ -1,10 +1,13 @@
-"""Seconds of a training step: packed samples in the hull against all samples, at an equal batch."""
+"""Seconds and losses of training steps: packed samples in the hull against all samples, at an equal batch."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from statistics import fmean, stdev
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -17,9 +20,7 @@ from charnerf.types import RayBundle, RenderOutput
 from charnerf.volume.renderers.base import AbstractRenderer
 
 OPACITY_WEIGHT = 0.1  # of the default loss
-SLICE_RAYS = (
-    128  # of the baseline: 20,480 samples, as large as a slice may be on a machine of 16 GiB at width 128
-)
+SLICE_RAYS = 128  # of the baseline: 20,480 samples; larger slices need more memory and are no faster on a CPU
 
 
 @dataclass(frozen=True)
@@ -56,21 +57,96 @@ def step_timings(
         repeats: Turns.
         baseline: Name under which the pixelNeRF-like evaluation takes part.
     """
-    methods: dict[str, Callable[[], float]] = {}
-    for name, renderer in renderers.items():
-        methods[name] = _step(subject, batch, renderer)
-    methods[baseline] = _step(subject, batch, None)
+    steps = {name: trainer(subject, renderer) for name, renderer in {**renderers, baseline: None}.items()}
+    methods = {name: partial(step, batch) for name, step in steps.items()}
     return in_turns(methods, repeats=repeats, device=subject.truth.device)
 
 
-def _step(subject: Subject, batch: Batch, renderer: AbstractRenderer | None) -> Callable[[], float]:
+def loss_curves(
+    subject: Subject,
+    renderers: dict[str, AbstractRenderer],
+    *,
+    num_rays: int,
+    steps: int,
+    seeds: int,
+    rate: float,
+    baseline: str,
+) -> dict[str, list[list[float]]]:
+    """Losses by method, seed and step; with one seed all methods see the same batches.
+
+    Args:
+        subject: The character; its rays are drawn from.
+        renderers: By name.
+        num_rays: Rays of a batch.
+        steps: Batches.
+        seeds: Of batches and jitter, from 0.
+        rate: Learning rate.
+        baseline: Name under which the pixelNeRF-like evaluation takes part.
+    """
+    curves: dict[str, list[list[float]]] = {}
+    for name, renderer in {**renderers, baseline: None}.items():
+        curves[name] = []
+        for seed in range(seeds):
+            step = trainer(subject, renderer, rate=rate, seed=seed)
+            draws = torch.Generator().manual_seed(seed)
+            losses = []
+            for _ in range(steps):
+                index = torch.randint(len(subject.truth), (num_rays,), generator=draws).to(
+                    subject.truth.device
+                )
+                losses.append(step(Batch(rays=subject.rays[index], rgb=subject.truth[index])))
+            curves[name].append(losses)
+    return curves
+
+
+def compared_curves(curves: dict[str, list[list[float]]], *, baseline: str) -> list[dict[str, Any]]:
+    """Rows of each method: its mean loss over the last third of the steps, and how far it is from the baseline's.
+
+    The noise is the spread (standard deviation) of that mean between seeds, of method and baseline together.
+    """
+    last = {
+        name: [fmean(losses[-max(1, len(losses) // 3) :]) for losses in of_seeds]
+        for name, of_seeds in curves.items()
+    }
+    rows = []
+    for name, values in last.items():
+        apart = fmean(values) - fmean(last[baseline])
+        noise = max(_spread(values), _spread(last[baseline]))
+        rows.append(
+            {
+                "method": name,
+                "first loss": fmean(losses[0] for losses in curves[name]),
+                "last third": fmean(values),
+                "off the baseline": apart,
+                "spread of seeds": noise,
+                "within it": abs(apart) <= noise,
+            }
+        )
+    return rows
+
+
+def _spread(values: list[float]) -> float:
+    return stdev(values) if len(values) > 1 else 0.0
+
+
+def trainer(
+    subject: Subject, renderer: AbstractRenderer | None, *, rate: float = 1e-4, seed: int = 0
+) -> Callable[[Batch], float]:
+    """A step (encode, render, loss, gradient, Adam) of a copy of the subject's network; answers its loss.
+
+    Args:
+        subject: The character and the network.
+        renderer: By which renderer; None evaluates as the baseline.
+        rate: Learning rate.
+        seed: Of the samples' jitter.
+    """
     network = copy.deepcopy(subject.network).requires_grad_(True).train()
-    optimizer = torch.optim.Adam(network.parameters(), lr=1e-4)
+    optimizer = torch.optim.Adam(network.parameters(), lr=rate)
     with torch.no_grad():
         hull = network.carve(subject.views)
-    generator = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(seed)
 
-    def step() -> float:
+    def step(batch: Batch) -> float:
         optimizer.zero_grad(set_to_none=True)
         encoded = network.encode(subject.views, hull)
         if renderer is None:
