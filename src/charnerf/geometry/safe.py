@@ -34,6 +34,9 @@ def safe_normalize(vectors: Tensor) -> Tensor:
     vectors = full_precision(vectors)
     largest = vectors.detach().abs().amax(dim=-1, keepdim=True)
     is_zero = largest == 0
+    if not torch.is_grad_enabled():  # no gradient to guard: the same numbers in half the passes
+        scaled = vectors / largest.masked_fill(is_zero, 1.0)
+        return scaled / scaled.square().sum(dim=-1, keepdim=True).sqrt().masked_fill(is_zero, 1.0)
     below_normal = largest < 4.0 * torch.finfo(vectors.dtype).tiny
     scaled = torch.where(below_normal, vectors.detach(), vectors) / torch.where(is_zero, 1.0, largest)
     length = torch.where(is_zero, 1.0, scaled).square().sum(dim=-1, keepdim=True).sqrt()
