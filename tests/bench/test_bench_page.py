@@ -180,3 +180,20 @@ def test_kinds_get_a_panel_each(tmp_path):
     empty = [Row("culled", "1", 0.1, 1.0, 0.0, 0.0, 100.0)]
     path = plot_kinds({"a": rows, "b": rows, "c": rows, "empty": empty}, tmp_path / "kinds.png")
     assert path.stat().st_size > 1000
+
+
+def test_sections_show_their_numbers(tmp_path):
+    row = {"curve": "culled", "setting": "8", "seconds": 0.25}
+    parts = [
+        part("kinds", {"fog": [row], "empty picture": [row]}),
+        part("size", {"parameters": 15_000_000, "encoder": "ResNet-34", "rays": 64,
+                      "methods": {BASELINE: {"seconds": 2.0, "speed-up": 1.0}}}),
+        part("steps", STEPS),
+        part("scaling", [{"over": "views", "sizes": [1, 2], "seconds": [0.125, 0.25], "seconds_exponent": 1.0}]),
+        part("hull", []),
+    ]  # fmt: skip
+    write_page(tmp_path / "page.md", parts, pictures=tmp_path)
+    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert "15,000,000 parameters" in text and "0.125, 0.25" in text and "has no hull" in text
+    assert "![kinds](kinds.png)" in text and "| empty picture" in text
+    assert text.count("| base ") == 1 and "over pixelNeRF-like" in text

@@ -10,16 +10,16 @@ from typing import Any
 import torch
 
 from charnerf import runs
-from charnerf.bench.baseline import PixelNeRFLike
 from charnerf.bench.headline import ADAPTIVE, CULLED
 from charnerf.bench.measure import in_turns
-from charnerf.bench.rendering import BASELINE
-from charnerf.bench.subjects import Pictured, subject, untrained_like
+from charnerf.bench.rendering import BASELINE, measure
+from charnerf.bench.subjects import Pictured, reference, subject, untrained_like
 from charnerf.bench.training_step import batch_of, parameters_of, step_timings
 from charnerf.bench.workbench import settings_of
 from charnerf.config.composition import compose_config
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.base import AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
@@ -37,6 +37,8 @@ WITHOUT_RESNET = (
     "scale.feature_dim=512",
 )  # as many channels, where no package brings the ResNet
 NUM_RAYS = 64  # of the large networks
+FEWER = 4  # times fewer samples on the hull's segments than over the box
+LARGE_TOLERANCE = 0.05
 
 
 def network_of(overrides: Sequence[str]) -> tuple[CharNeRF, Any]:
@@ -72,26 +74,37 @@ def architecture_rows(
 
 
 def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
-    """Speed-ups of rendering over the baseline by pixelNeRF's own network, seeded weights, its numbers of samples."""
+    """Seconds and errors of rendering by pixelNeRF's own network, seeded weights.
+
+    Culled takes pixelNeRF's numbers of samples on the hull's segments of the rays, and a quarter of them: the
+    segments are a quarter of the box's length or less, so that this is the baseline's own spacing.
+    """
     has_resnet = find_spec("transformers") is not None
     network, cfg = network_of(PIXELNERF if has_resnet else PIXELNERF + WITHOUT_RESNET)
     like = settings_of(runs.build_renderer(cfg))
+    fewer = {**like, **{name: like[name] // FEWER for name in ("num_coarse", "num_fine")}}
     one = subject(pictured, network, kind="pixelNeRF's size", num_pixels=NUM_RAYS)
-    tolerance = 0.05
-    methods: dict[str, Callable[[], Any]] = {
-        BASELINE: partial(PixelNeRFLike(network).render, one.maps, one.rays),
-        CULLED: partial(CulledRenderer(**like).render, one.scene, one.rays),
-        ADAPTIVE: partial(AdaptiveRenderer(**like, tolerance=tolerance).render, one.scene, one.rays),
+    renderers: dict[str, AbstractRenderer] = {
+        f"{CULLED} {like['num_coarse']} + {like['num_fine']}": CulledRenderer(**like),
+        f"{CULLED} {fewer['num_coarse']} + {fewer['num_fine']}": CulledRenderer(**fewer),
+        f"{ADAPTIVE} {LARGE_TOLERANCE}": AdaptiveRenderer(**like, tolerance=LARGE_TOLERANCE),
     }
-    with torch.no_grad():
-        timings = in_turns(methods, repeats=repeats, device=one.truth.device)
-    base = timings[BASELINE].median
+    found = measure(one, renderers, reference(one), repeats=repeats)
+    base = found[BASELINE].seconds
     return {
         "parameters": parameters_of(network),
         "encoder": "ResNet-34" if has_resnet else "hourglass",
         "rays": NUM_RAYS,
-        "seconds": {name: timing.median for name, timing in timings.items()},
-        "speedup": {name: base / timing.median for name, timing in timings.items()},
+        "methods": {
+            name: {
+                "seconds": one.seconds,
+                "rays/s": one.rays_per_second,
+                "speed-up": base / one.seconds,
+                "rms error": one.rms_error,
+                "max error": one.max_error,
+            }
+            for name, one in found.items()
+        },
     }
 
 

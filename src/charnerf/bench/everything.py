@@ -40,7 +40,7 @@ Part = Callable[[Setting], Any]
 FRAMES = 36
 MEMORY_SIDES = (128, 256, 512)
 SOURCE_SIDES = (32, 64, 96, 128, 192)
-CURVE_STEPS, CURVE_SEEDS, CURVE_RATE = 60, 3, 1e-3
+CURVE_RAYS, CURVE_STEPS, CURVE_SEEDS, CURVE_RATE = 128, 60, 3, 1e-3
 
 
 def _headline(setting: Setting) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def _losses(setting: Setting) -> list[dict[str, Any]]:
     curves = loss_curves(
         one,
         {CULLED: CulledRenderer(**like), DENSE: DenseRenderer(**like)},
-        num_rays=int(cfg.scale.phase_rays[0]),
+        num_rays=CURVE_RAYS,
         steps=CURVE_STEPS,
         seeds=CURVE_SEEDS,
         rate=CURVE_RATE,
