@@ -32,6 +32,11 @@ def has_view_attention(run: Run) -> bool:
     return isinstance(combinator, dict) and str(combinator.get("_target_", "")).endswith(_TARGET)
 
 
+def with_view_attention(rows: Sequence[Row]) -> list[Row]:
+    """Rows whose first run has it."""
+    return [row for row in rows if has_view_attention(row.runs[0])]
+
+
 def make_profile(run: Run, *, trusted: Sequence[str] = ()) -> AttentionProfile:
     """The profile of a run over its first test characters: read where it is newer than the weights, else made and kept.
 
@@ -56,7 +61,7 @@ def make_profile(run: Run, *, trusted: Sequence[str] = ()) -> AttentionProfile:
 def attention(rows: Sequence[Row], folder: Path, *, trusted: Sequence[str] = ()) -> list[Block]:
     """The figure of the first run of every row that has view attention."""
     blocks: list[Block] = []
-    for number, row in enumerate(row for row in rows if has_view_attention(row.runs[0])):
+    for number, row in enumerate(with_view_attention(rows)):
         blocks.append(Heading(f"What view attention looks at: {row.label}"))
         try:
             profile = make_profile(row.runs[0], trusted=trusted)

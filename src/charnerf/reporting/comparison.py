@@ -1,6 +1,7 @@
 """Table II over the rows of a grid, ours beside the paper's, and what each row cost."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from charnerf.reporting.blocks import Block, Bullets, Heading, Table, Text
@@ -12,15 +13,62 @@ PAPER_KEYS = ("psnr", "ssim", "lpips")
 _SHARES = {"rays": "rays left out", "samples": "samples left out", "grid_cells": "grid cells left out"}
 
 
-def sorted_rows(rows: Sequence[Row]) -> list[Row]:
-    """In the paper's order where a row is one of the paper's, then best on the foreground first."""
+@dataclass(frozen=True)
+class Family:
+    """Rows that stand in one table.
+
+    Attributes:
+        variant: What they share beside their experiments, "" where nothing.
+        rows: In the paper's order.
+        of_paper: Whether they are several rows of the paper's Table II.
+    """
+
+    variant: str
+    rows: tuple[Row, ...]
+    of_paper: bool
+
+
+def families(rows: Sequence[Row]) -> list[Family]:
+    """Rows by what they share beside their experiment, the paper's Table II once for each; then all others, best first."""
+    by_variant: dict[str, list[Row]] = {}
+    for row in rows:
+        by_variant.setdefault(row.variant, []).append(row)
     order = list(TABLE_TWO)
+    found, others = [], []
+    for variant, members in sorted(by_variant.items()):
+        listed = [row for row in members if row.experiment in order]
+        if len({row.experiment for row in listed}) > 1:
+            ordered = sorted(listed, key=lambda row: order.index(row.experiment or ""))
+            found.append(Family(variant, tuple(ordered), of_paper=True))
+            others += [row for row in members if row not in listed]
+        else:
+            others += members
+    others = sorted(others, key=lambda row: -(row.mean("psnr_foreground") or 0.0))
+    return [*found, *([Family("", tuple(others), of_paper=False)] if others else [])]
 
-    def rank(row: Row) -> tuple[int, float]:
-        place = order.index(row.experiment) if row.experiment in order else len(order)
-        return place, -(row.mean("psnr_foreground") or 0.0)
 
-    return sorted(rows, key=rank)
+def sorted_rows(rows: Sequence[Row]) -> list[Row]:
+    """Table after table: in the paper's order where rows are the paper's, else best on the foreground first."""
+    return [row for family in families(rows) for row in family.rows]
+
+
+def shown_rows(rows: Sequence[Row], count: int = 8) -> list[Row]:
+    """All rows where there are few; else the one without any change and the best on the foreground, in their order."""
+    if len(rows) <= count:
+        return list(rows)
+    plain = [row for row in rows if not row.variant][:1]
+    best = sorted(rows, key=lambda row: -(row.mean("psnr_foreground") or 0.0))
+    chosen = [*plain, *(row for row in best if row not in plain)][:count]
+    return [row for row in rows if row in chosen]
+
+
+def left_out_rows(rows: Sequence[Row], shown: Sequence[Row]) -> list[Block]:
+    """Says that a picture does not show every row."""
+    if len(shown) == len(rows):
+        return []
+    return [
+        Text(f"{len(shown)} of {len(rows)} rows are shown: the plain one and the best on the foreground.")
+    ]
 
 
 def best_row(rows: Sequence[Row]) -> Row:
@@ -35,8 +83,49 @@ def spread(row: Row, key: str) -> str:
 
 
 def comparison(rows: Sequence[Row]) -> list[Block]:
-    """Quality of every row, the paper's figures beside where it has the row, and the baselines below."""
-    with_paper = any(row.experiment in TABLE_TWO for row in rows)
+    """Quality of every row, the paper's figures beside where it has the row, and the baselines below each table."""
+    blocks: list[Block] = []
+    found = families(rows)
+    for family in found:
+        blocks += _table(family, is_alone=len(found) == 1)
+    told = "Means over the views of a character, then over characters, then over seeds"
+    told += "; ± is the standard deviation over seeds." if any(len(row.runs) > 1 for row in rows) else "."
+    if any(_has_paper(family) for family in found):
+        told += " The paper trained for seven days on characters that are not published: its figures show the order, not a target."
+    if any(family.of_paper and family.variant for family in found):
+        told += " It has them for its own loss and settings alone; they stand beside every table."
+    reasons = {
+        str(run.metrics["lpips_reason"])
+        for row in rows
+        for run in row.runs
+        if run.metrics.get("lpips_reason")
+    }
+    blocks.append(Text(told))
+    blocks += [Text(f"LPIPS: none, because {reason}") for reason in sorted(reasons)]
+    return blocks + starts(rows)
+
+
+def starts(rows: Sequence[Row]) -> list[Block]:
+    """Rows whose weights were meant to begin pretrained, and where they began."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        for start in dict.fromkeys(run.start for run in row.runs if run.start):
+            found.setdefault(start, []).append(row.label)
+    return [Text(f"Start of {', '.join(labels)}: {start}") for start, labels in found.items()]
+
+
+def _has_paper(family: Family) -> bool:
+    return family.of_paper or any(_is_papers(row) for row in family.rows)
+
+
+def _is_papers(row: Row) -> bool:
+    """Whether a row that stands alone is one of the paper's as it is."""
+    return row.experiment in TABLE_TWO and not row.variant
+
+
+def _table(family: Family, *, is_alone: bool) -> list[Block]:
+    """Heading and table of a family."""
+    with_paper = _has_paper(family)
     keys = [
         (key, of_paper)
         for key in COLUMNS
@@ -47,29 +136,26 @@ def comparison(rows: Sequence[Row]) -> list[Block]:
         [
             row.label,
             str(len(row.runs)),
-            *(_paper(row, key) if of_paper else spread(row, key) for key, of_paper in keys),
+            *(
+                (_paper(row, key) if family.of_paper or _is_papers(row) else NONE)
+                if of_paper
+                else spread(row, key)
+                for key, of_paper in keys
+            ),
         ]
-        for row in rows
+        for row in family.rows
     ]
-    for name, scores in _baselines(rows):
+    for name, scores in _baselines(family.rows):
         found = [NONE if of_paper else cell(scores.get(key), COLUMNS[key][1]) for key, of_paper in keys]
         cells += [[name, NONE, *found]] if set(found) != {NONE} else []
-    told = "Means over the views of a character, then over characters, then over seeds"
-    told += "; ± is the standard deviation over seeds." if any(len(row.runs) > 1 for row in rows) else "."
-    if with_paper:
-        told += " The paper trained for seven days on characters that are not published: its figures show the order, not a target."
-    reasons = {
-        str(run.metrics["lpips_reason"])
-        for row in rows
-        for run in row.runs
-        if run.metrics.get("lpips_reason")
-    }
-    blocks: list[Block] = [
-        Heading("Table II" if with_paper else "All rows"),
-        Table(header, cells),
-        Text(told),
-    ]
-    return blocks + [Text(f"LPIPS: none, because {reason}") for reason in sorted(reasons)]
+    title = (
+        "Table II"
+        if family.of_paper or (is_alone and with_paper)
+        else "All rows"
+        if is_alone
+        else "Further rows"
+    )
+    return [Heading(f"{title}: {family.variant}" if family.variant else title), Table(header, cells)]
 
 
 def costs(rows: Sequence[Row]) -> list[Block]:

@@ -4,18 +4,29 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from charnerf.errors import DataError
-from charnerf.reporting.attention import attention
+from charnerf.reporting.attention import attention, with_view_attention
 from charnerf.reporting.blocks import Block, Heading, Text
 from charnerf.reporting.by_angle import by_angle
 from charnerf.reporting.characters import characters
-from charnerf.reporting.comparison import best_row, comparison, costs, sorted_rows, unfinished
+from charnerf.reporting.comparison import (
+    best_row,
+    comparison,
+    costs,
+    left_out_rows,
+    shown_rows,
+    sorted_rows,
+    unfinished,
+)
 from charnerf.reporting.drawn import drawn_matrix
 from charnerf.reporting.levels import levels
 from charnerf.reporting.matrix import matrix
 from charnerf.reporting.parts import verdict, write_report
+from charnerf.reporting.ray_weights import sharpness
 from charnerf.reporting.rows import Row, Run, common_overrides, group_rows, read_runs, read_unfinished
 from charnerf.reporting.trends import trends
 from charnerf.reporting.verdicts import significance
+
+ATTENTION_ROWS = 4  # figures of view attention in one report, at most
 
 
 def write_folder_report(
@@ -49,11 +60,14 @@ def write_folder_report(
     blocks += costs(rows)
     blocks += significance(rows)
     blocks += trends(rows, folder)
-    blocks += by_angle(rows, folder)
-    blocks += matrix(rows, folder)
+    shown = shown_rows(rows)
+    told = left_out_rows(rows, shown)
+    blocks += [*by_angle(shown, folder), *told]
+    blocks += [*matrix(shown, folder), *told]
     if drawings is not None:
-        blocks += drawn_matrix(rows, drawings, folder, trusted=trusted)
-    blocks += attention(rows, folder, trusted=trusted)
+        blocks += [*drawn_matrix(shown, drawings, folder, trusted=trusted), *told]
+    blocks += sharpness(rows, folder, trusted=trusted)
+    blocks += attention(shown_rows(with_view_attention(rows), ATTENTION_ROWS), folder, trusted=trusted)
     blocks += levels(rows)
     blocks += characters(rows)
     return write_report(folder, title, blocks)

@@ -8,6 +8,7 @@ from charnerf.reporting.blocks import Block
 from charnerf.reporting.drawn import drawn_matrix
 from charnerf.reporting.folder_report import write_folder_report
 from charnerf.reporting.levels import levels
+from charnerf.reporting.ray_weights import sharpness
 from charnerf.reporting.rows import group_rows, read_runs
 from charnerf.reporting.run_report import write_run_report
 
@@ -30,7 +31,7 @@ def report(folder: Path, *, drawings: Path | None = None, trusted: Sequence[str]
     if [run.folder for run in runs] != [folder]:
         return write_folder_report(folder, drawings=drawings, trusted=trusted)
     rows = group_rows(runs)
-    more: list[Block] = attention(rows, folder, trusted=trusted)
+    more: list[Block] = [*sharpness(rows, folder, trusted=trusted), *attention(rows, folder, trusted=trusted)]
     if drawings is not None:
         more += drawn_matrix(rows, drawings, folder, trusted=trusted)
     return write_run_report(folder, more=[*more, *levels(rows)])

@@ -15,6 +15,7 @@ from charnerf.reporting.plots import Curve, read_curve
 from charnerf.reporting.views import ViewTable, read_views
 
 CELL_FILE = "cell.json"  # how far a cell of a grid came; training writes it
+START_FILE = "start.txt"  # where weights began that were meant to begin pretrained; training writes it
 SEED, RESUMED, EXPERIMENT = "seed", "ckpt_path", "experiment"
 
 
@@ -30,6 +31,7 @@ class Run:
         metrics: Content of its metrics.json.
         curve: Its curve.csv, [] where it has none.
         views: Its views.csv, None where it has none.
+        start: Where its weights began, None where nothing is noted: all at random.
     """
 
     folder: Path
@@ -39,6 +41,7 @@ class Run:
     metrics: Mapping[str, Any]
     curve: Curve
     views: ViewTable | None
+    start: str | None = None
 
     @property
     def seed(self) -> int | None:
@@ -54,11 +57,13 @@ class Row:
         label: What distinguishes it from the other rows.
         experiment: Its row of the paper's Table II, None where it is none of them.
         runs: One a seed.
+        variant: What distinguishes it beside its experiment, "" where nothing does.
     """
 
     label: str
     experiment: str | None
     runs: tuple[Run, ...]
+    variant: str = ""
 
     def values(self, *keys: str) -> list[float]:
         """A figure of every run that has it, by its keys in metrics.json."""
@@ -122,11 +127,24 @@ def group_rows(runs: Sequence[Run]) -> list[Row]:
         groups.setdefault(_without_seed(run), []).append(run)
     members = list(groups.values())
     common = set.intersection(*(set(run.overrides) for run in runs)) if runs else set()
-    labels = [_label(group[0], common) for group in members]
-    if len(set(labels)) < len(labels):  # something beside the command line differs
-        labels = [f"{label} ({group[0].name})" for label, group in zip(labels, members, strict=True)]
+    own = [
+        [one for one in group[0].overrides if one not in common and not _is_seed(one)] for group in members
+    ]
+    names = _short_names(own)
+    variants = [" ".join(_renamed(one, names) for one in each if _key(one) != EXPERIMENT) for each in own]
+    labels = [
+        _label(group[0], each, variant) for group, each, variant in zip(members, own, variants, strict=True)
+    ]
+    twice = {
+        label for label in labels if labels.count(label) > 1
+    }  # something beside the command line differs
+    labels = [
+        f"{label} ({group[0].name})" if label in twice else label
+        for label, group in zip(labels, members, strict=True)
+    ]
     return [
-        Row(label, _experiment(group[0]), tuple(group)) for label, group in zip(labels, members, strict=True)
+        Row(label, _experiment(group[0]), tuple(group), variant)
+        for label, group, variant in zip(labels, members, variants, strict=True)
     ]
 
 
@@ -152,7 +170,7 @@ def data_root(run: Run) -> Path:
 
 
 def _read_run(path: Path, folder: Path) -> Run:
-    curve, views = path / "curve.csv", path / "views.csv"
+    curve, views, start = path / "curve.csv", path / "views.csv", path / START_FILE
     return Run(
         folder=path,
         name=_name(path, folder),
@@ -161,6 +179,7 @@ def _read_run(path: Path, folder: Path) -> Run:
         metrics=read_metrics(path / "metrics.json"),
         curve=read_curve(curve) if curve.is_file() else [],
         views=read_views(views) if views.is_file() else None,
+        start=start.read_text(encoding="utf-8").strip() if start.is_file() else None,
     )
 
 
@@ -192,7 +211,7 @@ def _cell(path: Path) -> tuple[str, str]:
 
 
 def _is_seed(override: str) -> bool:
-    return override.split("=", 1)[0].lstrip("+") in (SEED, RESUMED)
+    return _key(override) in (SEED, RESUMED)
 
 
 def _without_seed(run: Run) -> str:
@@ -208,10 +227,23 @@ def _experiment(run: Run) -> str | None:
     return chosen[0] if chosen else None
 
 
-def _label(run: Run, common: set[str]) -> str:
+def _label(run: Run, own: Sequence[str], variant: str) -> str:
     """What a run's command line says that not all of them say."""
-    own = [one for one in run.overrides if one not in common and not _is_seed(one)]
-    words = [one.removeprefix(f"{EXPERIMENT}=") for one in own]
-    return (
-        " ".join(words) or _experiment(run) or (str(run.config["name"]) if "name" in run.config else run.name)
-    )
+    chosen = [one.split("=", 1)[1] for one in own if _key(one) == EXPERIMENT]
+    words = " ".join([*chosen, variant]).strip()
+    return words or _experiment(run) or (str(run.config["name"]) if "name" in run.config else run.name)
+
+
+def _key(override: str) -> str:
+    return override.split("=", 1)[0].lstrip("+~")
+
+
+def _short_names(own: Sequence[Sequence[str]]) -> dict[str, str]:
+    """Last part of every key that rows differ in; the whole key where two end alike."""
+    keys = list(dict.fromkeys(_key(one) for each in own for one in each))
+    last = [key.split(".")[-1] for key in keys]
+    return {key: key if last.count(short) > 1 else short for key, short in zip(keys, last, strict=True)}
+
+
+def _renamed(override: str, names: Mapping[str, str]) -> str:
+    return f"{names[_key(override)]}={override.split('=', 1)[1]}" if "=" in override else override

@@ -103,12 +103,17 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def compare_rows(
-    scores: Mapping[str, Mapping[str, float]], *, resamples: int = RESAMPLES, seed: int = 0
+    scores: Mapping[str, Mapping[str, float]],
+    *,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
 ) -> list[Difference]:
-    """All pairs of rows, p-values corrected over them.
+    """Pairs of rows, p-values corrected over them.
 
     Args:
         scores: By row, then by character; pairs are over the characters that both rows have.
+        pairs: Rows to compare; None compares all of them.
         resamples: Of each pair.
         seed: Of the resamples, the same in every pair.
 
@@ -116,7 +121,7 @@ def compare_rows(
         Differences of pairs that share a character, the better row first.
     """
     found = []
-    for first, second in combinations(scores, 2):
+    for first, second in combinations(scores, 2) if pairs is None else pairs:
         shared = [name for name in scores[first] if name in scores[second]]
         if not shared:
             continue

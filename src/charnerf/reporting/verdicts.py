@@ -1,9 +1,12 @@
 """Which differences between rows hold, as a table and in words."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 from statistics import fmean
 
 from charnerf.reporting.blocks import Block, Bullets, Heading, Table, Text
+from charnerf.reporting.comparison import families
 from charnerf.reporting.rows import Row
 from charnerf.reporting.significance import LEVEL, RESAMPLES, Difference, compare_rows
 
@@ -13,6 +16,7 @@ METRICS = {
     "ssim": ("SSIM", "{:.3f}"),
     "silhouette_iou": ("IoU", "{:.3f}"),
 }
+MANY = 8  # rows whose pairs are still read
 ATTENTION, RIVALS, JUDGED = (
     "charnerf",
     ("pixelnerf", "no_mha", "no_view"),
@@ -30,23 +34,75 @@ def scores_by_character(row: Row, key: str) -> dict[str, float]:
     return {name: fmean(values) for name, values in found.items()}
 
 
-def differences(rows: Sequence[Row]) -> dict[str, list[Difference]]:
-    """All pairs of rows by metric, p-values corrected over the pairs of a metric."""
-    return {key: compare_rows({row.label: scores_by_character(row, key) for row in rows}) for key in METRICS}
+@dataclass(frozen=True)
+class Question:
+    """Rows that are compared with each other, p-values corrected over their pairs.
+
+    Attributes:
+        title: What is compared, "" where that is everything.
+        rows: All rows of the pairs.
+        pairs: Their labels, two by two.
+    """
+
+    title: str
+    rows: tuple[Row, ...]
+    pairs: tuple[tuple[str, str], ...]
+
+
+def questions(rows: Sequence[Row]) -> list[Question]:
+    """What is asked of a report's rows.
+
+    The rows of each Table II all with each other; two tables row by row; further rows with each other where they are few, with
+    one of them where they are many: the one that changes nothing, else the best on the foreground.
+    """
+    found = families(rows)
+    tables = [family for family in found if family.of_paper]
+    asked = [Question(family.variant, family.rows, _all_pairs(family.rows)) for family in tables]
+    for first, second in combinations(tables, 2):
+        names = {row.experiment: row.label for row in second.rows}
+        pairs = tuple((row.label, names[row.experiment]) for row in first.rows if row.experiment in names)
+        if pairs:
+            title = f"{first.variant or 'as it is'} against {second.variant or 'as it is'}"
+            asked.append(Question(title, (*first.rows, *second.rows), pairs))
+    for family in found:
+        if family.of_paper or len(family.rows) < 2:
+            continue
+        if len(family.rows) <= MANY:
+            asked.append(Question("further rows" if tables else "", family.rows, _all_pairs(family.rows)))
+            continue
+        against = next((row for row in family.rows if not row.variant), family.rows[0])
+        pairs = tuple((row.label, against.label) for row in family.rows if row is not against)
+        asked.append(Question(f"every row against {against.label}", family.rows, pairs))
+    return asked
+
+
+def _all_pairs(rows: Sequence[Row]) -> tuple[tuple[str, str], ...]:
+    return tuple(combinations([row.label for row in rows], 2))
+
+
+def differences(
+    rows: Sequence[Row], pairs: Sequence[tuple[str, str]] | None = None
+) -> dict[str, list[Difference]]:
+    """Pairs of rows (all of them by default) by metric, p-values corrected over the pairs of a metric."""
+    return {
+        key: compare_rows({row.label: scores_by_character(row, key) for row in rows}, pairs=pairs)
+        for key in METRICS
+    }
 
 
 def significance(rows: Sequence[Row]) -> list[Block]:
     """Which differences hold: in words, then every pair."""
-    if len(rows) < 2:
-        return []
-    found = differences(rows)
+    return [block for question in questions(rows) for block in _answer(question)]
+
+
+def _answer(question: Question) -> list[Block]:
+    found = differences(question.rows, question.pairs)
     counts = sorted({one.num_characters for each in found.values() for one in each})
+    title = "Which differences hold"
+    heading = Heading(f"{title}: {question.title}" if question.title else title)
     if not counts:
-        return [
-            Heading("Which differences hold"),
-            Text("The rows share no test character: nothing can be paired."),
-        ]
-    blocks: list[Block] = [Heading("Which differences hold")]
+        return [heading, Text("The rows share no test character: nothing can be paired.")]
+    blocks: list[Block] = [heading]
     told = (
         f"Paired bootstrap over {' or '.join(map(str, counts))} test characters, {RESAMPLES:,} resamples, seeds averaged first; a"
         " difference holds where p, corrected over the pairs by Holm, is below 0.05. Intervals are 95 %, of each pair alone."
@@ -59,10 +115,10 @@ def significance(rows: Sequence[Row]) -> list[Block]:
             f"So few characters can not decide so many pairs at once: p is at least {min(1.0, smallest):.2g}."
         )
         blocks.append(Text(f"{told} The intervals of single pairs still tell."))
-    verdict = attention_verdict(rows, found)
+    verdict = attention_verdict(question.rows, found)
     if verdict:
         blocks.append(Text(verdict))
-    order = [row.label for row in rows]
+    order = [row.label for row in question.rows]
     blocks.append(Bullets([sentence(key, found[key], order) for key in METRICS]))
     return [*blocks, _table(found)]
 
@@ -90,6 +146,8 @@ def sentence(key: str, pairs: Sequence[Difference], order: Sequence[str]) -> str
 
 def attention_verdict(rows: Sequence[Row], found: Mapping[str, Sequence[Difference]]) -> str | None:
     """Whether view attention earns its place against the rows without; None where the grid has not both."""
+    if len({row.variant for row in rows if row.experiment == ATTENTION}) > 1:  # one table against another
+        return None
     labels = {row.experiment: row.label for row in rows if row.experiment is not None}
     rivals = [labels[name] for name in RIVALS if name in labels]
     if ATTENTION not in labels or not rivals:

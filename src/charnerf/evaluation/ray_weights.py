@@ -1,0 +1,281 @@
+"""How sharp a field's surface is, and where it stands: entropy of ray weights, and depth against the captured mesh.
+
+The paper says of its surface loss that it concentrates the weights of a ray and gives no figures; these are they. Every row is
+sampled alike, whatever its own renderer does: NUM_SAMPLES even samples on the part of a ray inside the hull, constant density
+in each bin, the finest field. Letters: R rays, S samples a ray, Q shares of the rays, D bins of distance.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from charnerf.data.characters import Character
+from charnerf.data.layout import read_json, write_text_atomically
+from charnerf.data.raycast import RayCaster
+from charnerf.data.surface import load_surface_mesh
+from charnerf.errors import DataError
+from charnerf.evaluation.evaluate import fixed_views
+from charnerf.geometry.cameras import pixel_centres, pixel_rays
+from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.rays import occupied_to_t, points_along
+from charnerf.geometry.sampling import stratified_t_vals
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import RayBundle, Scene
+from charnerf.volume.compositing import expected_depth, weights_from_densities
+from charnerf.volume.renderers.base import AbstractRenderer
+
+RAY_WEIGHTS_FILE = "ray_weights.json"
+NUM_SAMPLES = 64  # a ray
+VIEWS = 4  # a character
+SIZE = 64  # rays across a picture, at most
+OPAQUE = 0.5
+SHARES = [place / 20 for place in range(20)]  # of the rays; the worst twentieth would set the scale
+REACH, STEP = 0.3, 0.02  # m, of the distances from the true surface
+_POINTS_AT_ONCE = 16_384
+
+
+@dataclass(frozen=True)
+class RayWeights:
+    """Means over the rays of a character at which both mesh and field are opaque, then over characters.
+
+    Attributes:
+        characters: Names.
+        num_rays: Rays of all characters that count.
+        opaque_share: Share of the mesh's rays at which the field is opaque too.
+        entropy: Of a ray's weights, in [0, 1]: see `normalised_entropy`.
+        depth_error_m: Mean of |expected depth - true depth|, m.
+        depth_offset_m: Mean of expected depth - true depth, m: negative in front of the surface.
+        hull_depth_error_m: The same error of the hull's first occupied point, None for a model without a hull.
+        shares: Shares of the rays, (Q).
+        entropy_at: Entropy that this share of the rays stays below, (Q).
+        error_at: Depth error that this share of the rays stays below, (Q), m.
+        distances_m: Middles of bins of distance behind the true surface, (D), m.
+        weight_at: Mean share of a ray's weight in each, (D).
+    """
+
+    characters: list[str]
+    num_rays: int
+    opaque_share: float
+    entropy: float
+    depth_error_m: float
+    depth_offset_m: float
+    hull_depth_error_m: float | None
+    shares: list[float]
+    entropy_at: list[float]
+    error_at: list[float]
+    distances_m: list[float]
+    weight_at: list[float]
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """What is kept of rays (R,): entropy, expected and true depth, hull's depth, m; histogram (R, D); the mesh's rays in all."""
+
+    entropy: Tensor
+    depth: Tensor
+    truth: Tensor
+    hull: Tensor
+    histogram: Tensor
+    num_asked: int
+
+
+def normalised_entropy(weights: Tensor) -> Tensor:
+    """Entropy of weights (..., S) as a share of the largest: -sum_i p_i log(p_i) / log(S) with p_i = w_i / sum_j w_j.
+
+    0 where one sample holds all the weight, 1 where all hold the same; 1 too where there is no weight.
+
+    Args:
+        weights: Non-negative, S of at least 2.
+
+    Returns:
+        (...), in [0, 1].
+    """
+    total = weights.sum(-1, keepdim=True)
+    even = torch.full_like(weights, 1.0 / weights.shape[-1])
+    shares = torch.where(total > 0, weights / total.clamp_min(torch.finfo(weights.dtype).tiny), even)
+    entropy = torch.special.entr(shares).sum(-1)
+    return (entropy / np.log(weights.shape[-1])).clamp(0.0, 1.0)
+
+
+@torch.no_grad()
+def ray_weights(
+    network: CharNeRF,
+    renderer: AbstractRenderer,
+    characters: Sequence[Character],
+    *,
+    views: int = VIEWS,
+    size: int = SIZE,
+    num_samples: int = NUM_SAMPLES,
+) -> RayWeights:
+    """Measure a trained model on characters whose meshes are known.
+
+    Args:
+        network: In eval mode.
+        renderer: Its renderer, asked only where a ray is inside the hull.
+        characters: Of a test split; those without a mesh are passed over.
+        views: Cameras a character, the first of its fixed test views.
+        size: Rays across a picture, at most: every n-th pixel.
+        num_samples: S.
+
+    Raises:
+        DataError: If no character has a mesh, or the model shows nothing of them.
+    """
+    known = [one for one in characters if one.mesh_file is not None]
+    if not known:
+        raise DataError(
+            "the data set has no meshes of these characters, expected some: true depth needs them."
+        )
+    found = {one.name: _character(network, renderer, one, views, size, num_samples) for one in known}
+    seen = {name: rays for name, rays in found.items() if len(rays.depth)}
+    if not seen:
+        raise DataError(
+            f"the model shows nothing of {', '.join(found)}, expected opaque rays; was it trained long enough?"
+        )
+    return _summary(list(seen), list(seen.values()), sum(one.num_asked for one in found.values()))
+
+
+def _summary(names: list[str], found: list[_Rays], num_asked: int) -> RayWeights:
+    """Means over characters; quantiles over all rays."""
+    errors = [(one.depth - one.truth).abs() for one in found]
+    hulls = [(one.hull - one.truth).abs().nanmean() for one in found if not bool(one.hull.isnan().all())]
+    shares = torch.tensor(SHARES, dtype=torch.float64)
+
+    def mean(values: Sequence[Tensor]) -> float:
+        return float(torch.stack([one.double().mean() for one in values]).mean())
+
+    def at(values: Sequence[Tensor]) -> list[float]:
+        joined = torch.cat(list(values)).double().numpy()
+        return [float(value) for value in np.quantile(joined, shares.numpy())]
+
+    count = sum(len(one.depth) for one in found)
+    return RayWeights(
+        characters=names,
+        num_rays=count,
+        opaque_share=count / max(num_asked, 1),
+        entropy=mean([one.entropy for one in found]),
+        depth_error_m=mean(errors),
+        depth_offset_m=mean([one.depth - one.truth for one in found]),
+        hull_depth_error_m=mean(hulls) if hulls else None,
+        shares=list(SHARES),
+        entropy_at=at([one.entropy for one in found]),
+        error_at=at(errors),
+        distances_m=[round(float(value), 6) for value in 0.5 * (_edges()[1:] + _edges()[:-1])],
+        weight_at=torch.stack([one.histogram.double().mean(0) for one in found]).mean(0).tolist(),
+    )
+
+
+def _edges() -> Tensor:
+    return torch.linspace(-REACH, REACH, round(2 * REACH / STEP) + 1, dtype=torch.float64)
+
+
+def _character(
+    network: CharNeRF,
+    renderer: AbstractRenderer,
+    character: Character,
+    views: int,
+    size: int,
+    num_samples: int,
+) -> _Rays:
+    """Rays of a character's cameras at which both are opaque."""
+    device = network.box[0].device
+    assert character.mesh_file is not None
+    caster = RayCaster(load_surface_mesh(character.mesh_file))
+    scene = network.scene(network.encode(character.sources.to(device)), 0)
+    parts = []
+    for index in fixed_views(character, views):
+        camera = character.cameras[index]
+        step = -(-max(camera.width, camera.height) // size)
+        pixels = pixel_centres(camera.width, camera.height).to(camera.focal.dtype)[::step, ::step]
+        rays = pixel_rays(camera, pixels.reshape(-1, 2))
+        truth = caster.first_hits(rays.origins.numpy(), rays.directions.numpy()).distances
+        hit = torch.from_numpy(np.flatnonzero(np.isfinite(truth)))
+        parts.append(
+            _measured(
+                scene, renderer, rays[hit].to(device), torch.from_numpy(truth)[hit].to(device), num_samples
+            )
+        )
+
+    def joined(name: str) -> Tensor:
+        return torch.cat([getattr(one, name) for one in parts]).cpu()
+
+    return _Rays(
+        entropy=joined("entropy"),
+        depth=joined("depth"),
+        truth=joined("truth"),
+        hull=joined("hull"),
+        histogram=joined("histogram"),
+        num_asked=sum(one.num_asked for one in parts),
+    )
+
+
+def _measured(
+    scene: Scene, renderer: AbstractRenderer, rays: RayBundle, truth: Tensor, num_samples: int
+) -> _Rays:
+    """Weights along rays (R,) that meet the mesh at truth (R,), m; those that the field lets through are left out."""
+    asked = len(truth)
+    ways = renderer.occupied(scene, rays)
+    inside = (ways.length > 0).nonzero()[:, 0]
+    ways, truth = ways.take(inside), truth[inside]
+    s_vals = stratified_t_vals(torch.zeros_like(ways.length), ways.length, num_samples)
+    t_vals = occupied_to_t(ways.t_edges, ways.occupied, s_vals)
+    points = points_along(ways.rays, t_vals)
+    densities = _densities(scene, points, ways.rays.directions[:, None].expand_as(points))
+    weights, _ = weights_from_densities(densities, (ways.length[:, None] / num_samples).expand_as(t_vals))
+    opaque = weights.sum(-1) > OPAQUE
+    weights, t_vals, truth = weights[opaque], t_vals[opaque], truth[opaque]
+    first = ways.occupied.to(torch.int8).argmax(-1, keepdim=True)
+    entry = ways.t_edges.gather(-1, first)[:, 0][opaque]
+    return _Rays(
+        entropy=normalised_entropy(weights),
+        depth=expected_depth(weights, t_vals, ways.t_edges[:, -1][opaque]),
+        truth=truth,
+        hull=entry if scene.hull is not None else torch.full_like(entry, torch.nan),
+        histogram=_histogram(weights, t_vals - truth[:, None]),
+        num_asked=asked,
+    )
+
+
+def _densities(scene: Scene, points: Tensor, dirs: Tensor) -> Tensor:
+    """Densities of the finest field at samples (R, S, 3), zero outside the hull."""
+    flat, towards = points.reshape(-1, 3), dirs.reshape(-1, 3)
+    packed = torch.arange(len(flat), device=flat.device)
+    if scene.hull is not None:
+        packed = hull_contains(scene.hull, flat).nonzero()[:, 0]
+    densities = flat.new_zeros(len(flat))
+    for part in packed.split(_POINTS_AT_ONCE):
+        densities[part] = scene.answer_densities(flat[part], towards[part]).densities.to(densities.dtype)
+    return densities.reshape(points.shape[:-1])
+
+
+def _histogram(weights: Tensor, behind: Tensor) -> Tensor:
+    """Share of each ray's weight (R, S) in bins of distance behind the true surface, (R, D)."""
+    edges = _edges().to(behind)
+    place = torch.bucketize(behind, edges) - 1
+    within = (place >= 0) & (place < len(edges) - 1)
+    shares = weights / weights.sum(-1, keepdim=True)
+    empty = weights.new_zeros(len(weights), len(edges) - 1)
+    return empty.scatter_add(-1, place.clamp(0, len(edges) - 2), torch.where(within, shares, 0.0))
+
+
+def write_ray_weights(path: Path, found: RayWeights) -> None:
+    """Write what was measured as JSON, in one step."""
+    write_text_atomically(path, json.dumps(asdict(found)) + "\n")
+
+
+def read_ray_weights(path: Path) -> RayWeights:
+    """Read what was measured.
+
+    Raises:
+        DataError: If it is missing or another file.
+    """
+    try:
+        return RayWeights(**read_json(path))
+    except TypeError as error:
+        raise DataError(
+            f"{path}: found other keys ({error}), expected figures of ray weights; remove the file."
+        ) from error
