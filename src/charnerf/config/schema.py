@@ -38,6 +38,7 @@ class Scale:
     steps: Count | None
     seconds: Annotated[float, Above(0)] | None
     eval_views: Count | None
+    mesh_resolution: Annotated[int, AtLeast(16)]
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from charnerf.types import Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
-MESH_RESOLUTION = 128
+MESH_RESOLUTION = 128  # of the one mesh that is kept
 
 
 def finish_run(
@@ -52,7 +52,7 @@ def finish_run(
     device = next(model.parameters()).device
 
     def make_mesh(scene: Scene, views: SourceViews) -> BuiltMesh:
-        return build_mesh(scene, views, resolution=MESH_RESOLUTION)
+        return build_mesh(scene, views, resolution=cfg.scale.mesh_resolution)
 
     metrics = evaluate(
         model,
