@@ -15,6 +15,7 @@ from omegaconf import DictConfig
 from charnerf.config import validate
 from charnerf.config.composition import run_door, trusted_by
 from charnerf.config.grid import grid_command
+from charnerf.errors import GridError
 
 
 @hydra.main(version_base="1.3", config_path="conf", config_name="train")
@@ -34,7 +35,7 @@ def train(cfg: DictConfig) -> None:
 
 def train_all() -> None:
     """Train a run; or a grid, and report over it, also if some of its cells failed."""
-    from charnerf.training.grid import begin_grid, check_grid, report_grid
+    from charnerf.training.grid import begin_grid, check_grid, is_lost_worker, report_grid
 
     grid = grid_command(sys.argv[1:])
     if grid is None:
@@ -44,6 +45,13 @@ def train_all() -> None:
     since = begin_grid(grid.folder)
     try:
         train()
+    except Exception as error:
+        if is_lost_worker(error):
+            raise GridError(
+                f"{grid.folder}: a process of the launcher was killed, which ended the others, expected all to live; was there"
+                " memory enough? The same command goes on with what is not done."
+            ) from error
+        raise
     finally:
         report_grid(grid.folder)
     check_grid(grid.folder, since=since)

@@ -9,6 +9,7 @@ from charnerf.training.cells import DONE, cells_of
 
 log = logging.getLogger(__name__)
 BEGUN_FILE = ".begun"
+LOST_WORKERS = ("TerminatedWorkerError", "BrokenProcessPool")  # joblib's, by name: it is an extra
 
 
 def begin_grid(grid: Path) -> float:
@@ -16,6 +17,11 @@ def begin_grid(grid: Path) -> float:
     grid.mkdir(parents=True, exist_ok=True)
     (grid / BEGUN_FILE).touch()
     return (grid / BEGUN_FILE).stat().st_mtime
+
+
+def is_lost_worker(error: BaseException) -> bool:
+    """Whether a launcher says that one of its processes was killed."""
+    return type(error).__name__ in LOST_WORKERS
 
 
 def report_grid(grid: Path) -> Path | None:
