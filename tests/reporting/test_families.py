@@ -79,10 +79,11 @@ def test_a_search_is_labelled_by_what_differs_and_best_first(search):
     assert [family.of_paper for family in families(search)] == [False]
 
 
-def test_the_papers_figures_stand_beside_the_row_without_a_change_alone(search):
-    (table,) = tables(comparison(search)).values()
-    paper = table.header.index("paper")
-    assert {line[0]: line[paper] for line in table.rows if line[paper] != "-"} == {"charnerf": "34.3"}
+def test_the_papers_figures_do_not_stand_in_a_search(search):
+    assert "paper" not in tables(comparison(search))["All rows"].header
+    alone = [row for row in search if row.label == "charnerf"]
+    table = tables(comparison(alone))["Table II"]
+    assert table.rows[0][table.header.index("paper")] == "34.3"
 
 
 def test_many_rows_are_compared_with_the_one_without_a_change(search):

@@ -14,13 +14,13 @@ from PIL import Image
 
 _STYLE = """
 :root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f23; background: #fff; max-width: 1180px;
+body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f23; background: #fff; max-width: 1320px;
        margin: 2rem auto; padding: 0 1.2rem; }
 h1 { font-size: 1.7rem; margin-bottom: .3rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
 p.lead { font-size: 1.1rem; }
 table { border-collapse: collapse; margin: .8rem 0; font-variant-numeric: tabular-nums;
-        display: block; overflow-x: auto; font-size: .92rem; }
-th, td { padding: .3rem .6rem; text-align: right; border-bottom: 1px solid #e3e5e8; white-space: nowrap; }
+        display: block; overflow-x: auto; font-size: .88rem; }
+th, td { padding: .3rem .5rem; text-align: right; border-bottom: 1px solid #e3e5e8; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
 thead th { border-bottom: 2px solid #9aa0a8; font-weight: 600; }
 tbody tr:first-child td { font-weight: 600; }

@@ -52,7 +52,7 @@ def sorted_rows(rows: Sequence[Row]) -> list[Row]:
     return [row for family in families(rows) for row in family.rows]
 
 
-def shown_rows(rows: Sequence[Row], count: int = 8) -> list[Row]:
+def shown_rows(rows: Sequence[Row], count: int = 7) -> list[Row]:
     """All rows where there are few; else the one without any change and the best on the foreground, in their order."""
     if len(rows) <= count:
         return list(rows)
@@ -115,12 +115,8 @@ def starts(rows: Sequence[Row]) -> list[Block]:
 
 
 def _has_paper(family: Family) -> bool:
-    return family.of_paper or any(_is_papers(row) for row in family.rows)
-
-
-def _is_papers(row: Row) -> bool:
-    """Whether a row that stands alone is one of the paper's as it is."""
-    return row.experiment in TABLE_TWO and not row.variant
+    """Whether the paper's figures stand beside ours: in its tables, and where a row stands alone."""
+    return family.of_paper or (len(family.rows) == 1 and family.rows[0].experiment in TABLE_TWO)
 
 
 def _table(family: Family, *, is_alone: bool) -> list[Block]:
@@ -136,25 +132,14 @@ def _table(family: Family, *, is_alone: bool) -> list[Block]:
         [
             row.label,
             str(len(row.runs)),
-            *(
-                (_paper(row, key) if family.of_paper or _is_papers(row) else NONE)
-                if of_paper
-                else spread(row, key)
-                for key, of_paper in keys
-            ),
+            *(_paper(row, key) if of_paper else spread(row, key) for key, of_paper in keys),
         ]
         for row in family.rows
     ]
     for name, scores in _baselines(family.rows):
         found = [NONE if of_paper else cell(scores.get(key), COLUMNS[key][1]) for key, of_paper in keys]
         cells += [[name, NONE, *found]] if set(found) != {NONE} else []
-    title = (
-        "Table II"
-        if family.of_paper or (is_alone and with_paper)
-        else "All rows"
-        if is_alone
-        else "Further rows"
-    )
+    title = "Table II" if with_paper else "All rows" if is_alone else "Further rows"
     return [Heading(f"{title}: {family.variant}" if family.variant else title), Table(header, cells)]
 
 

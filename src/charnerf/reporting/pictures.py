@@ -10,7 +10,7 @@ from charnerf.evaluation.pictures import save_picture
 
 CELL = 128  # pixels
 _INK = (60, 60, 60)
-_HEADER, _LABEL = 18, 150
+_HEADER, _LINE, _LABEL = 18, 14, 150
 _GAP = 6
 
 
@@ -39,17 +39,19 @@ def save_matrix(
 
     Args:
         path: PNG file.
-        columns: Titles; long ones are cut.
+        columns: Titles; long ones take several lines.
         rows: Label (lines of text) and pictures.
     """
     font = ImageFont.load_default(11)
-    size = (_LABEL + len(columns) * (CELL + _GAP), _HEADER + len(rows) * (CELL + _GAP))
+    titles = [_wrapped(title, font, CELL) for title in columns]
+    header = _HEADER + _LINE * (max((len(lines) for lines in titles), default=1) - 1)
+    size = (_LABEL + len(columns) * (CELL + _GAP), header + len(rows) * (CELL + _GAP))
     sheet = Image.new("RGB", size, "white")
     pen = ImageDraw.Draw(sheet)
-    for column, title in enumerate(columns):
-        pen.text((_LABEL + column * (CELL + _GAP), 2), _cut(title, font, CELL), _INK, font)
+    for column, lines in enumerate(titles):
+        pen.multiline_text((_LABEL + column * (CELL + _GAP), 2), "\n".join(lines), _INK, font, spacing=2)
     for row, (label, pictures) in enumerate(rows):
-        top = _HEADER + row * (CELL + _GAP)
+        top = header + row * (CELL + _GAP)
         lines = [_cut(line, font, _LABEL - 8) for line in label.splitlines()]
         pen.multiline_text((4, top + CELL // 2 - 7 * len(lines)), "\n".join(lines), _INK, font)
         for column, picture in enumerate(pictures):
@@ -59,6 +61,18 @@ def save_matrix(
                 sheet.paste(picture.resize((CELL, CELL), how), (_LABEL + column * (CELL + _GAP), top))
     save_picture(path, sheet)
     return path
+
+
+def _wrapped(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: int) -> list[str]:
+    """Lines of a text that fit into a width, broken at spaces; a longer word is cut."""
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and font.getlength(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(_cut(word, font, width))
+    return lines or [""]
 
 
 def _cut(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: int) -> str:

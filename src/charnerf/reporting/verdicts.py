@@ -120,7 +120,7 @@ def _answer(question: Question) -> list[Block]:
         blocks.append(Text(verdict))
     order = [row.label for row in question.rows]
     blocks.append(Bullets([sentence(key, found[key], order) for key in METRICS]))
-    return [*blocks, _table(found)]
+    return [*blocks, _table(found, question.pairs)]
 
 
 def sentence(key: str, pairs: Sequence[Difference], order: Sequence[str]) -> str:
@@ -173,11 +173,8 @@ def attention_verdict(rows: Sequence[Row], found: Mapping[str, Sequence[Differen
     return f"{start}: {ours} is {'; '.join(parts)}." if parts else None
 
 
-def _table(found: Mapping[str, Sequence[Difference]]) -> Table:
+def _table(found: Mapping[str, Sequence[Difference]], pairs: Sequence[tuple[str, str]]) -> Table:
     """Every pair: difference, interval and corrected p in each metric; a star where it holds."""
-    pairs = list(
-        dict.fromkeys(tuple(sorted((one.first, one.second))) for each in found.values() for one in each)
-    )
     rows = []
     for first, second in pairs:
         cells = []
