@@ -183,9 +183,11 @@ def test_kinds_get_a_panel_each(tmp_path):
 
 
 def test_sections_show_their_numbers(tmp_path):
-    row = {"curve": "culled", "setting": "8", "seconds": 0.25}
+    settings = ((BASELINE, "64 + 32", 2.0, 0.02), ("culled", "8", 0.25, 0.01), ("culled", "4", 0.1, 0.03))
+    names = ("curve", "setting", "seconds", "rms_error")
+    rows = [{**dict(zip(names, values, strict=True)), "max_error": 0.1} for values in settings]
     parts = [
-        part("kinds", {"fog": [row], "empty picture": [row]}),
+        part("kinds", {"fog": rows, "empty picture": rows[:1]}),
         part("size", {"parameters": 15_000_000, "encoder": "ResNet-34", "rays": 64,
                       "methods": {BASELINE: {"seconds": 2.0, "speed-up": 1.0}}}),
         part("steps", STEPS),
@@ -195,5 +197,6 @@ def test_sections_show_their_numbers(tmp_path):
     write_page(tmp_path / "page.md", parts, pictures=tmp_path)
     text = (tmp_path / "page.md").read_text(encoding="utf-8")
     assert "15,000,000 parameters" in text and "0.125, 0.25" in text and "has no hull" in text
-    assert "![kinds](kinds.png)" in text and "| empty picture" in text
+    assert "![kinds](kinds.png)" in text
+    assert [line.split()[5:10:2] for line in text.splitlines() if line.startswith("| fog ")] == [["8", "0.25", "8"]]
     assert text.count("| base ") == 1 and "over pixelNeRF-like" in text

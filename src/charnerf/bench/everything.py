@@ -71,7 +71,7 @@ def _samples(setting: Setting) -> list[dict[str, Any]]:
 def _swept(methods: Callable[[Workbench], dict[tuple[str, str], Method]], name: str) -> Part:
     def part(setting: Setting) -> list[dict[str, Any]]:
         subjects, references = setting.split_characters()
-        rows = sweep(methods(setting.bench), subjects[:1], references, repeats=3)
+        rows = sweep(methods(setting.bench), subjects[:1], references[:1], repeats=3)
         plot_work_precision(
             rows, setting.picture(name), title=f"{name}: {NUM_PIXELS} pixels of one character"
         )

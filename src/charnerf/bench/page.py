@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from charnerf.bench.baseline import NUM_COARSE, NUM_FINE
+from charnerf.bench.rendering import BASELINE
 from charnerf.bench.tables import comparison_table, headline_table, markdown
 from charnerf.bench.targets import target_rows
 from charnerf.data.layout import write_text_atomically
@@ -15,6 +17,7 @@ from charnerf.errors import DataError
 BEGIN, END = "<!-- figures: written by `charnerf bench` -->", "<!-- end of figures -->"
 TITLE = "# Error against run time"
 EMBEDDED = "embedded"
+BASELINE_SETTING = f"{NUM_COARSE} + {NUM_FINE}"
 
 
 def write_page(page: Path, parts: Sequence[dict[str, Any]], *, pictures: Path) -> None:
@@ -107,9 +110,24 @@ def _table(text: str = "") -> Callable[[Any, Picture], list[str]]:
 
 
 def _kinds(found: Any, picture: Picture) -> list[str]:
-    """Every kind's rows in one table."""
-    rows = [{"kind": kind, **row} for kind, some in found.items() for row in some]
-    return [picture("kinds"), rows_table(rows)]
+    """The fastest setting of each method that is as accurate as the baseline, on every kind."""
+    rows = []
+    for kind, some in found.items():
+        base = next(row for row in some if (row["curve"], row["setting"]) == (BASELINE, BASELINE_SETTING))
+        for curve in dict.fromkeys(row["curve"] for row in some):
+            good = [row for row in some if row["curve"] == curve and row["rms_error"] <= base["rms_error"]]
+            if curve == BASELINE or not good:
+                continue
+            best = min(good, key=lambda row: row["seconds"])
+            shown = {name: best[name] for name in ("curve", "setting", "seconds")}
+            errors = {name: best[name] for name in ("rms_error", "max_error")}
+            rows.append({"kind": kind, **shown, "speed-up": base["seconds"] / best["seconds"], **errors})
+    return [
+        picture("kinds"),
+        f"The fastest setting of each method whose rms error is at most that of `{BASELINE}` with {BASELINE_SETTING} samples, "
+        "and its speed-up over that; a method without such a setting is left out. All points are in bench.json.",
+        rows_table(rows) if rows else "No setting is.",
+    ]
 
 
 def _size(found: Any, picture: Picture) -> list[str]:
