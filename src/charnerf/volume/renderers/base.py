@@ -131,7 +131,7 @@ class AbstractRenderer(ABC):
             inside = inside & hull_contains(scene.hull, points)
         chunk = chunk_size(self.memory_mib, scene.bytes_a_point)
         if not torch.is_grad_enabled():  # each chunk would give the maps a dense gradient of its own
-            chunk = min(chunk, self.points_at_once)
+            chunk = min(chunk, self.points_at_once, points_in_caches(scene.bytes_a_point))
         answer, evaluated = self._evaluate(field, points, dirs, inside, chunk)
         weights, _ = self.quadrature.weights(answer.densities, s_vals, self._edges(seen, s_vals))
         far = seen.t_edges[:, -1]
@@ -182,6 +182,14 @@ class AbstractRenderer(ABC):
 POINTS_AT_ONCE = (
     4096  # more leave the caches: 8192 cost as much a point, 16384 nearly twice (two cores of a server)
 )
+BYTES_AT_ONCE = (
+    96 * 2**20
+)  # of a field: a layer of 6 MiB. Of 16 MiB it took twice as long at width 512 (one core)
+
+
+def points_in_caches(bytes_a_point: int) -> int:
+    """Points a chunk without gradient of a wide field: above, the system hands out the memory of each tensor anew."""
+    return max(256, BYTES_AT_ONCE // bytes_a_point)
 
 
 def chunk_size(memory_mib: float, bytes_a_point: int = 16_384) -> int:

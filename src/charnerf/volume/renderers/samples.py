@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from charnerf.types import DensityAnswer, RayBundle, Scene, TensorRecord
-from charnerf.volume.renderers.base import POINTS_AT_ONCE
+from charnerf.volume.renderers.base import POINTS_AT_ONCE, points_in_caches
 
 UNKNOWN = 0.5  # colour of samples that nobody asked for
 
@@ -25,7 +25,7 @@ class Samples:
     def __init__(self, scene: Scene, rays: RayBundle, points_at_once: int) -> None:
         self.scene = scene
         self.rays = rays
-        self.size = min(points_at_once, POINTS_AT_ONCE)
+        self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.bytes_a_point))
         self.num_colours = 0
         self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
         self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
