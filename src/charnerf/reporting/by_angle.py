@@ -38,10 +38,10 @@ def views_by_row(rows: Sequence[Row]) -> dict[str, list[View]]:
     return {label: views for label, views in found.items() if views}
 
 
-def by_angle(rows: Sequence[Row], folder: Path) -> list[Block]:
-    """Both diagrams, or why there are none."""
+def by_angle(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str = "") -> list[Block]:
+    """Both diagrams, or why there are none; the suffix is that of the pictures' names."""
     views = views_by_row(rows)
-    blocks: list[Block] = [Heading("By viewing angle")]
+    blocks: list[Block] = [Heading(f"By viewing angle{title}")]
     if not views:
         told = (
             "These runs kept no figures of single views (views.csv); evaluate them again with this version."
@@ -56,7 +56,7 @@ def by_angle(rows: Sequence[Row], folder: Path) -> list[Block]:
         _plot(
             _boxes(views, AZIMUTHS, azimuth_name),
             AZIMUTHS,
-            folder / "report_azimuth.png",
+            folder / f"report_azimuth{suffix}.png",
             azimuth,
             "by azimuth",
         )
@@ -70,7 +70,7 @@ def by_angle(rows: Sequence[Row], folder: Path) -> list[Block]:
         _plot(
             _boxes(views, seen, distance_name),
             seen,
-            folder / "report_distance.png",
+            folder / f"report_distance{suffix}.png",
             distance,
             f"by {distance}",
         )

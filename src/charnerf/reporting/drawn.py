@@ -125,15 +125,23 @@ def guessed_side(front: np.ndarray) -> np.ndarray:
 
 
 def drawn_matrix(
-    rows: Sequence[Row], drawings: Path, folder: Path, *, trusted: Sequence[str] = ()
+    rows: Sequence[Row],
+    drawings: Path,
+    folder: Path,
+    *,
+    trusted: Sequence[str] = (),
+    title: str = "",
+    suffix: str = "",
 ) -> list[Block]:
     """The sheet of drawings through the first run of every row; rows whose weights are gone are told.
+
+    The suffix is that of the picture's name.
 
     Raises:
         DataError: If the folder holds no drawings.
     """
     characters = find_drawings(drawings)
-    blocks: list[Block] = [Heading("Real drawings in every row")]
+    blocks: list[Block] = [Heading(f"Real drawings in every row{title}")]
     models: dict[str, Model] = {}
     for row in rows:
         try:
@@ -149,7 +157,7 @@ def drawn_matrix(
         except CharNeRFError as error:
             problems.append(f"{character.name} is left out: {error}")
     if lines:
-        path = save_matrix(folder / "report_drawings.png", [*VIEWS, *models], lines)
+        path = save_matrix(folder / f"report_drawings{suffix}.png", [*VIEWS, *models], lines)
         blocks.append(Picture(path, "Drawings through every row, seen from azimuth 30 and 150 degrees"))
     told = (
         "No truth exists for these. A back that is not drawn is the mirrored front, a side that is not drawn a guess from the"

@@ -12,6 +12,7 @@ from charnerf.reporting.comparison import (
     best_row,
     comparison,
     costs,
+    families,
     left_out_rows,
     shown_rows,
     sorted_rows,
@@ -60,12 +61,15 @@ def write_folder_report(
     blocks += costs(rows)
     blocks += significance(rows)
     blocks += trends(rows, folder)
-    shown = shown_rows(rows)
-    told = left_out_rows(rows, shown)
-    blocks += [*by_angle(shown, folder), *told]
-    blocks += [*matrix(shown, folder), *told]
-    if drawings is not None:
-        blocks += [*drawn_matrix(shown, drawings, folder, trusted=trusted), *told]
+    for number, family in enumerate(families(rows)):
+        shown = shown_rows(family.rows)
+        told = left_out_rows(family.rows, shown)
+        title, suffix = f": {family.variant}" if family.variant else "", f"_{number}" if number else ""
+        blocks += [*by_angle(shown, folder, title=title, suffix=suffix), *told]
+        blocks += [*matrix(shown, folder, title=title, suffix=suffix), *told]
+        if drawings is not None:
+            blocks += drawn_matrix(shown, drawings, folder, trusted=trusted, title=title, suffix=suffix)
+            blocks += told
     blocks += sharpness(rows, folder, trusted=trusted)
     blocks += attention(shown_rows(with_view_attention(rows), ATTENTION_ROWS), folder, trusted=trusted)
     blocks += levels(rows)

@@ -20,11 +20,11 @@ AZIMUTHS = (45.0, 270.0)  # between two drawings, and the side that none shows
 LEVEL_WEIGHT = 0.5  # of a degree of elevation against one of azimuth when a view is chosen
 
 
-def matrix(rows: Sequence[Row], folder: Path) -> list[Block]:
-    """The sheet of test characters, evenly from the worst to the best, in two views each."""
+def matrix(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str = "") -> list[Block]:
+    """The sheet of test characters, evenly from the worst to the best, in two views each; the suffix is of the file's name."""
     runs = [row.runs[0] for row in rows]
     names = [name for name in ranked(rows) if all((run.folder / "images" / name).is_dir() for run in runs)]
-    blocks: list[Block] = [Heading("The same characters and views in every row")]
+    blocks: list[Block] = [Heading(f"The same characters and views in every row{title}")]
     if not names:
         return [*blocks, Text("The runs kept no predictions (images/) of one and the same character.")]
     last, count = len(names) - 1, min(CHARACTERS, len(names))
@@ -37,7 +37,7 @@ def matrix(rows: Sequence[Row], folder: Path) -> list[Block]:
     views = max(len(character.source_names) for character in opened)
     columns = [*opened[0].source_names, *[""] * (views - len(opened[0].source_names)), "truth"]
     lines = [line for character in opened for line in _lines(character, runs, views)]
-    path = save_matrix(folder / "report_matrix.png", [*columns, *(row.label for row in rows)], lines)
+    path = save_matrix(folder / f"report_matrix{suffix}.png", [*columns, *(row.label for row in rows)], lines)
     caption = (
         "Drawings, truth and every row; characters from the worst to the best, the first seed of each row"
     )
