@@ -198,5 +198,7 @@ def test_sections_show_their_numbers(tmp_path):
     text = (tmp_path / "page.md").read_text(encoding="utf-8")
     assert "15,000,000 parameters" in text and "0.125, 0.25" in text and "has no hull" in text
     assert "![kinds](kinds.png)" in text
-    assert [line.split()[5:10:2] for line in text.splitlines() if line.startswith("| fog ")] == [["8", "0.25", "8"]]
+    assert [line.split()[5:10:2] for line in text.splitlines() if line.startswith("| fog ")] == [
+        ["8", "0.25", "8"]
+    ]
     assert text.count("| base ") == 1 and "over pixelNeRF-like" in text
