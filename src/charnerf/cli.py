@@ -82,6 +82,14 @@ def capture(
         Literal["unlit", "headlight"], typer.Option(help="Texture colours as they are, or shaded.")
     ] = "unlit",
     depth: Depth = False,
+    variants: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            help="Capture so many variants of each mesh instead of it: other proportions, other poses, NAME+1, NAME+2, ...",
+        ),
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same variants.")] = 0,
     jobs: Jobs = None,
 ) -> None:
     """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
@@ -102,6 +110,8 @@ def capture(
         sources=sources,
         light=light,
         depth=depth,
+        variants=variants,
+        seed=seed,
         jobs=jobs,
     )
 

@@ -94,6 +94,8 @@ def capture(
     sources: str,
     light: str,
     depth: bool,
+    variants: int,
+    seed: int,
     jobs: int | None,
 ) -> None:
     """Capture meshes into a data set.
@@ -102,7 +104,10 @@ def capture(
         DataError: After all others are done, if some could not be captured.
     """
     options = CaptureOptions(views=views, size=size, sources=sources, depth=depth, light=LIGHTS[light]())  # type: ignore[arg-type]
-    done = capture_dataset(meshes, output, split, options=options, up=up, facing=facing, processes=jobs)
+    axes = {"up": up, "facing": facing}
+    done = capture_dataset(
+        meshes, output, split, options=options, variants=variants, seed=seed, processes=jobs, **axes
+    )
     say(f"{len(done.captured)} characters captured into {output}, split {split}.")
     if done.captured:
         say(f"{split}: digest {split_digest(output, split)}")

@@ -1,5 +1,6 @@
 """Meshes to characters of a data set, in parallel processes; each is written aside and renamed."""
 
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -7,15 +8,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import trimesh
 from tqdm import tqdm
 
 from charnerf.capture.embree import CaptureOptions, capture_character
 from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
 from charnerf.capture.parallel import in_processes
+from charnerf.capture.variants import SEPARATOR, variant
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
 from charnerf.data.mesh_files import write_surface_mesh
+from charnerf.data.scene_mesh import surface_of_scene
+from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import CharNeRFError, DataError
 
 
@@ -40,6 +45,8 @@ def capture_dataset(
     options: CaptureOptions | None = None,
     up: str | None = None,
     facing: str | None = None,
+    variants: int = 0,
+    seed: int = 0,
     processes: int | None = None,
 ) -> CaptureReport:
     """Capture meshes into one split of a data set, new or already there.
@@ -51,6 +58,8 @@ def capture_dataset(
         options: How they are captured.
         up: Axis that points up in all files; None for each format's own.
         facing: Signed axis that the characters face; None for each format's own.
+        variants: Capture this many variants of each mesh instead of it (capture/variants.py), named NAME+1, NAME+2, ...
+        seed: What variants are drawn from; the same seed gives the same ones, however many.
         processes: Worker processes; None for one a core.
 
     Returns:
@@ -66,33 +75,36 @@ def capture_dataset(
     check_name("split", split)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
-    refuse_taken_names(open_or_new(root), [file.stem for file in files])
+    items = [
+        _Item(file, number) for file in files for number in (range(1, variants + 1) if variants else (0,))
+    ]
+    refuse_taken_names(open_or_new(root), [item.name for item in items])
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
-    work = partial(_capture_file, root=root, options=options, up=up, facing=facing)
-    messages: dict[Path, str | None] = {}
+    work = partial(_capture_item, root=root, options=options, up=up, facing=facing, seed=seed)
+    messages: dict[_Item, str | None] = {}
     facts = made_by(options)
     try:
-        with tqdm(total=len(files), desc="capture", unit="character", dynamic_ncols=True) as bar:
-            for file, message in in_processes(work, files, processes):
+        with tqdm(total=len(items), desc="capture", unit="character", dynamic_ncols=True) as bar:
+            for item, message in in_processes(work, items, processes):
                 if message is None:
-                    add_to_split(root, split, [file.stem], made_by=facts)
+                    add_to_split(root, split, [item.name], made_by=facts)
                 else:
                     bar.write(f"not captured: {message}")
-                messages[file] = message
+                messages[item] = message
                 bar.update()
     finally:  # interrupted: what was written meanwhile belongs to the data set too
-        unlisted = [file.stem for file in files if file not in messages and (root / file.stem).is_dir()]
+        unlisted = [item.name for item in items if item not in messages and (root / item.name).is_dir()]
         if unlisted:
             add_to_split(root, split, unlisted, made_by=facts)
     return CaptureReport(
-        captured=tuple(file.stem for file in files if messages[file] is None),
-        failed=tuple(message for file in files if (message := messages[file]) is not None),
+        captured=tuple(item.name for item in items if messages[item] is None),
+        failed=tuple(message for item in items if (message := messages[item]) is not None),
     )
 
 
 def capture_scene_to(
-    root: str | Path, name: str, scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOptions
+    root: str | Path, name: str, scene: trimesh.Scene | trimesh.Trimesh | SurfaceMesh, options: CaptureOptions
 ) -> Path:
     """Capture one scene that stands in the world frame; dataset.json is left to `layout.add_to_split`.
 
@@ -150,12 +162,28 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
     return files
 
 
-def _capture_file(
-    file: Path, *, root: Path, options: CaptureOptions, up: str | None, facing: str | None
+@dataclass(frozen=True)
+class _Item:
+    """A mesh file, as it is (0) or one of its variants."""
+
+    file: Path
+    number: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.file.stem}{SEPARATOR}{self.number}" if self.number else self.file.stem
+
+
+def _capture_item(
+    item: _Item, *, root: Path, options: CaptureOptions, up: str | None, facing: str | None, seed: int
 ) -> str | None:
-    """Capture a file; the message of what is wrong with it, or None."""
+    """Capture a file or a variant of it; the message of what is wrong with it, or None."""
     try:
-        capture_scene_to(root, file.stem, load_scene(file, up, facing), options)
+        surface = surface_of_scene(load_scene(item.file, up, facing))
+        if item.number:
+            drawn_from = (seed, zlib.crc32(item.file.stem.encode()), item.number)
+            surface = variant(surface, np.random.default_rng(drawn_from))
+        capture_scene_to(root, item.name, surface, options)
     except CharNeRFError as err:
         return str(err)
     return None

@@ -73,11 +73,13 @@ class CapturedCharacter:
     surface: SurfaceMesh
 
 
-def capture_character(scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOptions) -> CapturedCharacter:
+def capture_character(
+    scene: trimesh.Scene | trimesh.Trimesh | SurfaceMesh, options: CaptureOptions
+) -> CapturedCharacter:
     """Take all pictures of a scene that stands in the world frame.
 
     Args:
-        scene: World frame, from `meshes.load_scene` or a generator.
+        scene: World frame, from `meshes.load_scene` or a generator; or its surface.
         options: How.
 
     Returns:
@@ -86,7 +88,7 @@ def capture_character(scene: trimesh.Scene | trimesh.Trimesh, options: CaptureOp
     Raises:
         DataError: If the scene has no triangles.
     """
-    surface = surface_of_scene(scene)
+    surface = scene if isinstance(scene, SurfaceMesh) else surface_of_scene(scene)
     targets, sources = framing_cameras(surface, options)
     studio = _Studio(surface, options)
     shots = [studio.shoot(camera) for camera in _each(targets)]
