@@ -182,9 +182,8 @@ class AbstractRenderer(ABC):
 POINTS_AT_ONCE = (
     4096  # more leave the caches: 8192 cost as much a point, 16384 nearly twice (two cores of a server)
 )
-BYTES_AT_ONCE = (
-    96 * 2**20
-)  # of a field: a layer of 6 MiB. Of 16 MiB it took twice as long at width 512 (one core)
+# of a field: layers of 6 MiB; with 16 MiB width 512 took a fifth longer (one core)
+BYTES_AT_ONCE = 96 * 2**20
 
 
 def points_in_caches(bytes_a_point: int) -> int:
