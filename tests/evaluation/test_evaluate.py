@@ -11,6 +11,7 @@ from PIL import Image
 
 from charnerf.data.characters import load_character
 from charnerf.errors import DataError, NumericalError
+from charnerf.evaluation import evaluate as evaluation
 from charnerf.evaluation import metrics
 from charnerf.evaluation.angles import azimuth_bin, view_angles
 from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
@@ -198,3 +199,24 @@ def test_metrics_are_written_whole_or_not_at_all(tmp_path):
         write_metrics(path, {"psnr": math.nan})
     assert json.loads(path.read_text()) == {"psnr": 1.5}
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_baselines_of_the_same_views_are_measured_once_a_process(figure_dataset, monkeypatch):
+    """A grid's cells share their characters: the second one finds the baselines' figures, and its own are its own."""
+    first = evaluate(HullModel(), HullRenderer(), figure_dataset, "test", views=3, progress=False)
+    scored = []
+    score = evaluation.score_view
+
+    def counted(picture, *rest, **more):
+        scored.append(picture)
+        return score(picture, *rest, **more)
+
+    monkeypatch.setattr(evaluation, "score_view", counted)
+    second = evaluate(BlindModel(), WhiteRenderer(), figure_dataset, "test", views=3, progress=False)
+    assert len(scored) == 2 * 3  # ours alone
+    assert second["baselines"].keys() == first["baselines"].keys()
+    for name, found in second["baselines"].items():
+        assert {key: value for key, value in found.items() if key != "seconds"} == {
+            key: value for key, value in first["baselines"][name].items() if key != "seconds"
+        }
+    assert second["psnr"] != first["psnr"]

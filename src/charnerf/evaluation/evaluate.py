@@ -1,6 +1,7 @@
 """A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
 
 from collections.abc import Callable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -9,7 +10,7 @@ import trimesh
 from tqdm import tqdm
 
 from charnerf.data.characters import Character, load_character
-from charnerf.data.layout import names_of, read_dataset
+from charnerf.data.layout import TRANSFORMS_FILE, names_of, read_dataset
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.evaluation import surface_error
 from charnerf.evaluation.angles import view_angles
@@ -219,20 +220,49 @@ def _evaluate_character(
     truth = None if character.mesh_file is None else surface_error.true_points(character.mesh_file)
     hull_mesh = _draw_baselines(state, drawn, character, indices, close)
     images = character.images(indices)
-    _score(state, character, indices, images, drawn)
+    known = _KNOWN.of(character, indices, close)
+    _score(state, character, indices, images, {key: each for key, each in drawn.items() if key not in known})
     for method, found in (
         ("ours", surface),
         ("white", "the white picture has no surface"),
         ("visual_hull", hull_mesh),
         ("nearest", None if close is None else close.mesh),
     ):
-        if method in drawn:
+        if method not in drawn:
+            continue
+        if method in known:
+            state.scores[method][name] = deepcopy(known[method])
+        else:
             _score_surface(state.scores[method][name], found, truth, character.cameras)
+            if method != "ours":
+                known[method] = deepcopy(state.scores[method][name])
     if output is not None:
         stems = [character.image_files[index].stem for index in indices]
         for stem, picture in zip(stems, drawn["ours"], strict=True):
             save_prediction(output / "images" / name / f"{stem}.png", picture)
         save_sheet(output / "images" / name / "sheet.png", character, indices, images, drawn)
+
+
+class _KnownBaselines:
+    """Scores of baselines that this process has measured: a grid's cells share their characters, and no model is in them."""
+
+    def __init__(self, most: int = 256) -> None:
+        self._scores: dict[tuple[Any, ...], dict[str, CharacterScores]] = {}
+        self._most = most
+
+    def of(
+        self, character: Character, indices: list[int], close: Nearest | None
+    ) -> dict[str, CharacterScores]:
+        """By baseline, what is known of a character as it lies on the disk; what is put there is known from then on."""
+        written = (character.folder / TRANSFORMS_FILE).stat().st_mtime_ns
+        near = None if close is None else (close.name, close.iou)
+        key = (character.folder.resolve(), written, tuple(indices), near)
+        while len(self._scores) >= self._most and key not in self._scores:
+            del self._scores[next(iter(self._scores))]
+        return self._scores.setdefault(key, {})
+
+
+_KNOWN = _KnownBaselines()
 
 
 def _make_mesh(state: Collected, mesh: MakeMesh, scene: Any, sources: SourceViews) -> trimesh.Trimesh | str:
