@@ -1,10 +1,8 @@
 """Evaluates as little as a tolerance allows, like an adaptive integrator, and says what error it made.
 
 Letters: R rays, K bins a ray, P points. For each ray: bins on the hull's segments; densities front to back
-until nothing behind
-can be seen; colours only of samples that count; an estimate of the error of every bin; bins with large
-errors cut into three,
-their samples kept, until the estimate is below the tolerance.
+until nothing behind can be seen; colours only of samples that count; an estimate of the error of every bin;
+bins with large errors cut into three, their samples kept, until the estimate is below the tolerance.
 """
 
 from dataclasses import dataclass
@@ -52,8 +50,7 @@ class AdaptiveRenderer(AbstractRenderer):
     """Chooses samples for each ray by an estimate of the error.
 
     Only the finest field is asked. Training (with a generator, or where gradients are kept) renders as the
-    culled renderer: the
-    samples must not depend on what is being learnt.
+    culled renderer: the samples must not depend on what is being learnt.
 
     Args:
         quadrature: As the culled renderer; used in training.
