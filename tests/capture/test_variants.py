@@ -34,6 +34,17 @@ def test_a_variant_stands_where_the_character_stood(seed):
     assert mesh.is_watertight
 
 
+def test_no_variant_leaves_the_box():
+    """A character with long arms, in many variants: none reaches farther than 1.5 m or than it did itself."""
+    wide = trimesh.creation.box((3.2, 0.3, 2.0))
+    wide.apply_translation((0.0, 0.0, 1.0))
+    surface = surface_of_scene(wide.subdivide().subdivide())
+    for seed in range(20):
+        triangles = variant(surface, np.random.default_rng(seed)).triangles
+        assert np.abs(triangles[..., 0]).max() <= 1.6 + 1e-5
+        assert np.abs(triangles[..., 1]).max() <= 1.5 + 1e-5
+
+
 def test_variants_differ_by_seed_and_number_alone(tmp_path):
     trimesh.creation.box((0.6, 0.4, 2.0)).export(tmp_path / "hero.obj")
     options = CaptureOptions(views=2, size=16)

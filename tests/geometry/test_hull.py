@@ -125,6 +125,13 @@ def test_drawings_of_different_characters_are_refused():
         carve(replace(views, images=images), grid_size=64)
 
 
+def test_a_figure_wider_than_the_box_is_told_as_such():
+    """Its drawings agree; it is the space looked at that is too narrow."""
+    box_min, box_max = torch.tensor((-0.3, -0.3, -0.8)), torch.tensor((0.3, 0.3, 2.8))
+    with pytest.raises(DataError, match=r"within 0\.3 m of its axis.*model\.box_half_extent"):
+        build_hull(views_of(FIGURES["lefty"], size=64), box_min=box_min, box_max=box_max, grid_size=64)
+
+
 def test_an_empty_silhouette_is_refused_with_its_view():
     views = views_of(FIGURES["ball"])
     images = views.images.clone()

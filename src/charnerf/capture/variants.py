@@ -13,6 +13,7 @@ from charnerf.capture.meshes import HEIGHT
 from charnerf.data.surface_mesh import SurfaceMesh
 
 SEPARATOR = "+"  # NAME+2 is the second variant of NAME
+REACH = 1.5  # m: width and depth that no variant goes beyond to a side, unless its character did
 _KNOTS = np.linspace(0.0, HEIGHT, 6)  # m: feet, knees, hips, chest, head, top
 
 
@@ -29,14 +30,17 @@ def variant(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
     Returns:
         Same triangles, moved: 2 m tall, feet on z = 0, middle of its box on the z axis.
     """
-    triangles = _bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3)
+    triangles = _stand(_bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3))
+    reach = np.abs(triangles).max(axis=(0, 1))[:2]
+    allowed = np.maximum(REACH, np.abs(surface.triangles).max(axis=(0, 1))[:2])
+    triangles[..., :2] *= np.minimum(1.0, allowed / np.maximum(reach, 1e-9))
     corners = np.arange(3)
     if rng.random() < 0.5:
         triangles[..., 0] *= -1.0
         corners = corners[::-1]  # keeps the outside outside
     return replace(
         surface,
-        triangles=np.ascontiguousarray(_stand(triangles)[:, corners], dtype=np.float32),
+        triangles=np.ascontiguousarray(triangles[:, corners], dtype=np.float32),
         uvs=np.ascontiguousarray(surface.uvs[:, corners]),
         colors=np.ascontiguousarray(surface.colors[:, corners]),
     )

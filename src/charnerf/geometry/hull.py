@@ -128,6 +128,13 @@ def _carve(
         if not missed:
             break
         if float(dilations.max()) >= WIDEST_DILATION:
+            if bool((low <= box_min).logical_or(high >= box_max)[:2].any()):
+                reach = 0.5 * float((box_max - box_min)[0])
+                raise DataError(
+                    f"source views {missed}: found a figure of 2 m that reaches the sides of the space looked at, expected "
+                    f"one within {reach:.1f} m of its axis. Lower its arms or wings, or train with a larger "
+                    "model.box_half_extent."
+                )
             raise DataError(
                 f"source views {missed}: found drawings whose silhouettes disagree by more than {WIDEST_DILATION:.0f} pixels, "
                 "expected views of one character at one height on one floor line. Align them, or set model.hull=false."
