@@ -13,6 +13,7 @@ from charnerf.geometry.safe import safe_normalize
 from charnerf.models.features.base import ViewReadings
 from charnerf.models.features.image import ImageFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
+from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
 from charnerf.models.heads.blend import BlendHead
 from charnerf.models.heads.radiance import RadianceHead
 from charnerf.models.inputs import PointInputs
@@ -145,12 +146,18 @@ def test_image_hull_features_by_hand():
         edge=torch.tensor(((-0.02, 0.01),)),  # the smallest that counts is the second: the first is mirrored
         source_dirs=torch.tensor((((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),)),
         mirrored=torch.tensor((1.0, 0.0)),
+        places=torch.tensor(((0.5, -1.0, 0.25),)),
+        half_lengths=torch.tensor(((0.1, 0.2, 0.8),)),
     )
     numbers = torch.tanh(torch.tensor((0.4, 2.0, 8.0, -0.16, -0.8, -3.2, 0.08, 0.4, 1.6)))
     expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))
     features = ImageHullFeatures()
     torch.testing.assert_close(features(readings)[0, 0], expected)
     assert features.num_extras == 16
+    section = torch.tensor((0.5, -1.0, 0.25, 0.25, 1.0, 0.0625, 0.3125, 1.25, 1.0625, 0.0, 1 / 3, 1.0))
+    both = ImageHullSectionFeatures()
+    torch.testing.assert_close(both(readings)[0, 1], torch.cat((features(readings)[0, 1], section)))
+    assert both.num_extras == 28
     assert ImageFeatures()(readings).shape == (1, 2, 0) and ImageFeatures().num_extras == 0
 
 

@@ -17,6 +17,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from charnerf.geometry.cameras import directions_to_points, project
+from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
 from charnerf.geometry.hull import hull_contains
 from charnerf.geometry.rays import box_interval, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, importance_t_vals, merge_t_vals, stratified_t_vals
@@ -40,6 +41,7 @@ class PixelAligned:
     pictures: Tensor
     hull: Hull | None
     hull_maps: Tensor | None
+    sections: CrossSections | None
 
     @classmethod
     def of(cls, encoded: EncodedViews, index: int = 0) -> "PixelAligned":
@@ -48,7 +50,8 @@ class PixelAligned:
         rgb, alpha = views.images[:, :3], views.images[:, 3:]
         hull = None if encoded.hull is None else encoded.hull[index]
         maps = None if hull is None else torch.stack((hull.front_depths, hull.edge_distances), dim=1)
-        return cls(views, encoded.feature_maps[index], rgb * alpha + (1.0 - alpha), hull, maps)
+        sections = None if hull is None else cross_sections(hull)
+        return cls(views, encoded.feature_maps[index], rgb * alpha + (1.0 - alpha), hull, maps, sections)
 
 
 @final
@@ -117,12 +120,15 @@ class PixelNeRFLike:
         source_rgb = _read(maps.pictures, pixels / size)
         behind, edge = self._read_hull(maps, pixels / size, depth.T, points)
         source_dirs = directions_to_points(cameras, points)
+        places, half_lengths = self._read_sections(maps, points)
         readings = ViewReadings(
             source_rgb=source_rgb,
             behind=behind,
             edge=edge,
             source_dirs=source_dirs,
             mirrored=maps.views.mirrored.to(points.dtype),
+            places=places,
+            half_lengths=half_lengths,
         )
         network = self.network
         encoded = field.single_view.locate(
@@ -140,6 +146,12 @@ class PixelNeRFLike:
                 source_dirs=source_dirs,
             )
         )
+
+    def _read_sections(self, maps: PixelAligned, points: Tensor) -> tuple[Tensor, Tensor]:
+        if maps.sections is None:
+            nothing = torch.zeros_like(points)
+            return nothing, nothing
+        return read_cross_sections(maps.sections, points)
 
     def _read_hull(
         self, maps: PixelAligned, shares: Tensor, depth: Tensor, points: Tensor

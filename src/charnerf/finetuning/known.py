@@ -20,7 +20,6 @@ from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import ViewMaps
 from charnerf.types import FieldOutput, RayBundle, Scene, TensorRecord
 from charnerf.volume.compositing import composite
 from charnerf.volume.renderers.base import POINTS_AT_ONCE, WHITE, AbstractRenderer
@@ -159,7 +158,7 @@ def _inputs_of(
     present = views.present.nonzero()[:, 0]
     views, maps = views[present], encoded.feature_maps[0][present]
     hull = None if encoded.hull is None else encoded.hull[0]
-    view_maps = ViewMaps.of(views, hull, present, (maps.shape[-1], maps.shape[-2]))
+    view_maps = network.view_maps(views, hull, present, maps)
     latents, mirrored = field.hoist(maps_to_rows(maps)), views.mirrored.to(maps.dtype)
     return lambda points, dirs: network.point_inputs(
         points, dirs, maps=view_maps, latents=latents, mirrored=mirrored

@@ -131,7 +131,7 @@ class CharNeRF(nn.Module):
         rows = maps_to_rows(maps)
         answer = partial(
             self.point_inputs,
-            maps=ViewMaps.of(views, hull, present, (maps.shape[-1], maps.shape[-2])),
+            maps=self.view_maps(views, hull, present, maps),
             mirrored=views.mirrored.to(maps.dtype),
         )
 
@@ -159,6 +159,11 @@ class CharNeRF(nn.Module):
             bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
         )
 
+    def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
+        """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
+        size = (maps.shape[-1], maps.shape[-2])
+        return ViewMaps.of(views, hull, present, size, sections=self.features.reads_sections)
+
     def point_inputs(
         self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor
     ) -> PointInputs:
@@ -169,8 +174,15 @@ class CharNeRF(nn.Module):
         else:
             behind = (sight.along_ray - sight.front) / self.box_half_extent
             edge = sight.edge / maps.cameras.width
+        places, half_lengths = maps.places(points)
         readings = ViewReadings(
-            source_rgb=sight.rgb, behind=behind, edge=edge, source_dirs=sight.source_dirs, mirrored=mirrored
+            source_rgb=sight.rgb,
+            behind=behind,
+            edge=edge,
+            source_dirs=sight.source_dirs,
+            mirrored=mirrored,
+            places=places,
+            half_lengths=half_lengths,
         )
         return PointInputs(
             latents=sight.latents,

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.cameras import directions_to_points, project_into_all
+from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
 from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
 from charnerf.types import Cameras, Hull, SourceViews
 
@@ -52,6 +53,7 @@ class ViewMaps:
             without a hull or where
             they lie beside the colours.
         hull_size: Width and height of the hull's maps.
+        sections: The hull's cross-sections, None where the model does not read them.
     """
 
     cameras: Cameras
@@ -60,10 +62,17 @@ class ViewMaps:
     pictures: Tensor
     hull_rows: Tensor | None
     hull_size: tuple[int, int]
+    sections: CrossSections | None
 
     @classmethod
     def of(
-        cls, views: SourceViews, hull: Hull | None, present: Tensor, map_size: tuple[int, int]
+        cls,
+        views: SourceViews,
+        hull: Hull | None,
+        present: Tensor,
+        map_size: tuple[int, int],
+        *,
+        sections: bool,
     ) -> "ViewMaps":
         """Prepare present views (V, ...) and the maps that their hull keeps of them.
 
@@ -72,6 +81,7 @@ class ViewMaps:
             hull: The character's hull with maps of all views, or None.
             present: Indices of the views in the hull's maps, (V,).
             map_size: Width and height of the feature maps.
+            sections: Whether to measure the hull's cross-sections.
         """
         rgb, alpha = views.images[:, :3], views.images[:, 3:]
         pictures, rows, size = rgb * alpha + (1.0 - alpha), None, (0, 0)
@@ -89,6 +99,7 @@ class ViewMaps:
             pictures=maps_to_rows(pictures),
             hull_rows=rows,
             hull_size=size,
+            sections=cross_sections(hull) if sections and hull is not None else None,
         )
 
     def look(self, points: Tensor, latents: Tensor) -> Sight:
@@ -114,6 +125,13 @@ class ViewMaps:
             source_dirs=directions,
             valid=valid,
         )
+
+    def places(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Places of points (P, 3) in the hull's runs and the runs' half-lengths, (P, 3) each; zeros if they are not read."""
+        if self.sections is None:
+            nothing = torch.zeros_like(points)
+            return nothing, nothing
+        return read_cross_sections(self.sections, points)
 
     def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""

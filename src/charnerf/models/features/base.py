@@ -16,6 +16,8 @@ class ViewReadings:
         edge: (P, V), distance from the mask's edge as a share of the picture's side; positive inside; 0 without a hull.
         source_dirs: (P, V, 3), unit.
         mirrored: (V,), 1 where the view is a mirrored one.
+        places: (P, 3), where the point lies in the hull's runs along the world's axes, ends at -1 and 1; 0 if not asked for.
+        half_lengths: (P, 3), m, of those runs; 0 if not asked for.
     """
 
     source_rgb: Tensor
@@ -23,6 +25,8 @@ class ViewReadings:
     edge: Tensor
     source_dirs: Tensor
     mirrored: Tensor
+    places: Tensor
+    half_lengths: Tensor
 
 
 class AbstractFeatures(ABC):
@@ -31,10 +35,12 @@ class AbstractFeatures(ABC):
     Attributes:
         num_extras: E, further inputs per view.
         reads_hull: Whether the hull's maps are read.
+        reads_sections: Whether the hull's cross-sections are read.
     """
 
     num_extras: int
     reads_hull: bool
+    reads_sections: bool = False
 
     @abstractmethod
     def __call__(self, readings: ViewReadings) -> Tensor:

@@ -1,0 +1,36 @@
+"""Hull features, and where the point lies in the hull's cross-section (beyond the paper)."""
+
+from typing import final
+
+import torch
+from torch import Tensor
+
+from charnerf.models.features.base import AbstractFeatures, ViewReadings
+from charnerf.models.features.image_hull import ImageHullFeatures
+
+LENGTH_SCALE = 0.1  # m: half of an arm's thickness
+
+
+@final
+class ImageHullSectionFeatures(AbstractFeatures):
+    """The hull as each view sees it, and the place in its cross-sections along the world's axes, alike for all views.
+
+    Places u in [-1, 1] and their squares; the squares' sums by twos, 1 on the ellipse that touches the run's ends: what lies beyond
+    is a corner that only the hull has; logarithms of the runs' half-lengths.
+    """
+
+    num_extras = ImageHullFeatures.num_extras + 12
+    reads_hull = True
+    reads_sections = True
+
+    def __init__(self) -> None:
+        self.image_hull = ImageHullFeatures()
+
+    def __call__(self, readings: ViewReadings) -> Tensor:
+        """Return (P, V, 28)."""
+        places, halves = readings.places, readings.half_lengths
+        squares = places.square()
+        lengths = (torch.log2(halves.clamp_min(1e-3) / LENGTH_SCALE) / 3.0).clamp(-1.0, 1.0)
+        section = torch.cat((places, squares, squares + squares.roll(1, dims=-1), lengths), dim=-1)
+        by_view = self.image_hull(readings)
+        return torch.cat((by_view, section[:, None].expand(-1, by_view.shape[1], -1)), dim=-1)
