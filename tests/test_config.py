@@ -350,8 +350,9 @@ def test_what_a_class_refuses_is_told_before_any_work() -> None:
 
 
 def test_settings_without_effect_are_warned_of(conf: Path) -> None:
-    with pytest.warns(UserWarning, match=r"features=image_hull reads the hull, but model\.hull=false"):
-        check_command_line(["scale=smoke", "features=image_hull", "model.hull=false"], conf=conf)
+    for option in ("image_hull", "image_hull_section"):
+        with pytest.warns(UserWarning, match=rf"features={option} reads the hull, but model\.hull=false"):
+            check_command_line(["scale=smoke", f"features={option}", "model.hull=false"], conf=conf)
     phase = "_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0"
     late = f"schedule.phases=[{{{phase}, until: {{steps: 50}}}},{{{phase}}}]"
     with pytest.warns(UserWarning, match=r"schedule\.phases\.0\.until\.steps=50, but budget\.steps=4: later"):

@@ -19,6 +19,7 @@ from charnerf.models.encoders.double import DoubleHourglass
 from charnerf.models.encoders.single import SingleHourglass
 from charnerf.models.features.image import ImageFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
+from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
 from charnerf.models.field import Field
 from charnerf.models.heads.blend import BlendHead
 from charnerf.models.heads.radiance import RadianceHead
@@ -99,7 +100,12 @@ def tiny_model(
 ) -> CharNeRF:
     """A model of a few thousand parameters; the names are those of the config's options."""
     encoder = single()
-    inputs = {"image": ImageFeatures, "image_hull": ImageHullFeatures}[features]()
+    options = {
+        "image": ImageFeatures,
+        "image_hull": ImageHullFeatures,
+        "image_hull_section": ImageHullSectionFeatures,
+    }
+    inputs = options[features]()
 
     def field() -> Field:
         return Field(

@@ -47,9 +47,9 @@ LIKE = {
 def tiny(person_views) -> Callable[..., Subject]:
     """A shaken model of a person, 48 pixels of a picture."""
 
-    def make(*, fine: bool = False) -> Subject:
+    def make(*, fine: bool = False, features: str = "image_hull") -> Subject:
         torch.manual_seed(1)
-        model = tiny_models.tiny_model(fine=fine, features="image_hull")
+        model = tiny_models.tiny_model(fine=fine, features=features)
         network = tiny_models.shake(model, scale=0.15).requires_grad_(False).eval()
         camera = helpers.target_cameras(4, size=24)[1]
         picture = helpers.photograph(helpers.person(symmetric=False), helpers.target_cameras(4, size=24)[1:2])
@@ -59,9 +59,10 @@ def tiny(person_views) -> Callable[..., Subject]:
     return make
 
 
+@pytest.mark.parametrize("features", ["image_hull", "image_hull_section"])
 @pytest.mark.parametrize("fine", [False, True])
-def test_the_baseline_answers_the_same_fields(fine, tiny):
-    one = tiny(fine=fine)
+def test_the_baseline_answers_the_same_fields(fine, features, tiny):
+    one = tiny(fine=fine, features=features)
     points = 0.4 * torch.randn(200, 3) + torch.tensor(helpers.CENTRE)
     dirs = torch.randn(200, 3)
     dirs = dirs / dirs.norm(dim=-1, keepdim=True)

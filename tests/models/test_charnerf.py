@@ -34,10 +34,11 @@ def person_hull(person_views) -> Hull:
     return tiny_models.tiny_model().carve(person_views)
 
 
+@pytest.mark.parametrize("features", ["image_hull", "image_hull_section"])
 @pytest.mark.parametrize("hull_from", ["batch", "characters"])
-def test_characters_of_different_numbers_of_views_share_a_batch(hull_from):
+def test_characters_of_different_numbers_of_views_share_a_batch(hull_from, features):
     """In any batch each gets the answer that it gets alone, carved in the batch or each by itself before."""
-    model = tiny_models.shake(tiny_models.tiny_model(views="mirrored"))
+    model = tiny_models.shake(tiny_models.tiny_model(views="mirrored", features=features))
     alone = [
         helpers.source_views(PERSON),
         helpers.source_views(helpers.ball(), helpers.source_cameras((90.0, 180.0))),

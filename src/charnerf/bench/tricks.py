@@ -17,7 +17,6 @@ from charnerf.bench.headline import Workbench
 from charnerf.bench.subjects import Subject, hull_in_float64
 from charnerf.geometry.hull import hull_contains
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import ViewMaps
 from charnerf.types import FieldOutput, Scene
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
@@ -98,7 +97,7 @@ def _unhoisted(subject: Subject) -> Callable[[Tensor, Tensor], FieldOutput]:
     network, field, views = subject.network, subject.network.coarse, subject.maps.views
     maps = subject.maps.feature_maps
     present = torch.arange(len(maps), device=maps.device)
-    seen_by = ViewMaps.of(views, subject.maps.hull, present, (maps.shape[-1], maps.shape[-2]))
+    seen_by = network.view_maps(views, subject.maps.hull, present, maps)
     inputs = partial(
         network.point_inputs,
         maps=seen_by,

@@ -9,6 +9,8 @@ from charnerf.schedule import Phase, PhaseSchedule
 
 Rule = Callable[..., Iterator[tuple[str, str]]]
 
+HULL_FEATURES = {"ImageHullFeatures": "image_hull", "ImageHullSectionFeatures": "image_hull_section"}
+
 
 def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[tuple[str, str]]:
     wide, name = (width, "model.width") if inner is None else (inner, "combinator.attention_width")
@@ -98,9 +100,10 @@ def check_ranges(plain: Any, key: str, problems: Problems) -> None:
 def idle_settings(plain: Mapping[str, Any]) -> list[str]:
     """Settings of a valid config that have no effect in its combination, each with what to do."""
     found = []
-    if not plain["model"]["hull"] and str(plain["features"]["_target_"]).endswith(".ImageHullFeatures"):
+    option = HULL_FEATURES.get(str(plain["features"]["_target_"]).rpartition(".")[2])
+    if option and not plain["model"]["hull"]:
         found.append(
-            "features=image_hull reads the hull, but model.hull=false: it reads zeros; use features=image."
+            f"features={option} reads the hull, but model.hull=false: it reads zeros; use features=image."
         )
     for index, phase in enumerate(plain["schedule"]["phases"]):
         for unit, end in (phase.get("until") or {}).items():

@@ -43,7 +43,7 @@ def cross_sections(hull: Hull) -> CrossSections:
     side = hull.occupancy.shape[-1] // POOL
     occupied = F.max_pool3d(hull.occupancy[None].to(torch.float32), POOL)[0] > 0
     cell = (hull.box_max - hull.box_min) / side
-    numbers = torch.arange(side, dtype=torch.float32, device=occupied.device)
+    numbers = torch.arange(side, dtype=cell.dtype, device=occupied.device)
     middles, halves = [], []
     for axis in range(3):
         number = numbers.view([-1 if a == axis else 1 for a in range(3)])
@@ -51,7 +51,7 @@ def cross_sections(hull: Hull) -> CrossSections:
         after = torch.where(occupied, float(side), number).flip(axis).cummin(axis).values.flip(axis)
         middles.append(hull.box_min[axis] + 0.5 * (before + after + 1.0) * cell[axis])
         halves.append(0.5 * (after - before - 1.0) * cell[axis])
-    known = occupied.to(torch.float32)
+    known = occupied.to(cell.dtype)
     return CrossSections(
         grid=torch.cat((torch.stack((*middles, *halves)) * known, known[None])),
         box_min=hull.box_min,
