@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Makes the released weights again, on a CPU or on a GPU where there is one: data, training, figures.
+#   docs/weights/make.sh FOLDER [more overrides of train.py]
+# FOLDER/meshes/{train,train_extra,val,test} hold the mesh files of docs/characters.md. Each step goes on where it was interrupted;
+# a data set that is there is not made again. A GPU has room for `scale=base trainer=gpu`.
+set -euo pipefail
+
+folder="$1"
+shift
+data="$folder/characters"
+
+capture() { # split, folder of meshes, further options
+  [ -e "$data/.$1" ] && return
+  charnerf capture "$folder/meshes/$2" -o "$data" --split "$1" "${@:3}"
+  touch "$data/.$1"
+}
+if [ ! -e "$data/.embedded" ]; then
+  charnerf generate -o "$data" --train 240 --val 0 --test 0 --seed 0
+  python - "$data/dataset.json" <<'PYTHON'
+import json, sys
+dataset = json.load(open(sys.argv[1]))
+dataset["splits"] = {"embedded": dataset["splits"]["train"]}
+json.dump(dataset, open(sys.argv[1], "w"), indent=1)
+PYTHON
+  touch "$data/.embedded"
+fi
+capture train train
+capture train_extra train_extra
+capture val val
+capture test test
+capture train_variants train --views 24 --variants 3
+capture train_extra_variants train_extra --views 24 --variants 3
+
+run="$folder/run"
+resume=()
+[ -e "$run/checkpoints/last.ckpt" ] && resume=("ckpt_path=$run/checkpoints/last.ckpt")
+python train.py data=folder "data.root=$data" \
+  'sampling.train_splits=[train,train_extra,train,train_extra,train_variants,train_extra_variants,embedded]' \
+  features=image_hull_section encoder.coarse_width=64 encoder.coarse_channels=64 augmentation=stretch_recolor \
+  augmentation.recolor_share=0.7 augmentation.stretch_share=0.8 averaging.decay=0.998 sampling.foreground_share=0.65 \
+  budget.seconds=7200 sampling.memory_mib=10000 \
+  "hydra.run.dir=$run" "${resume[@]}" "$@"
+
+charnerf evaluate "$run" --data "$data" --split test -o "$folder/measured" \
+  --nearest-from "$data:train" --nearest-from "$data:train_extra" --nearest-from "$data:embedded"
+charnerf card "$folder/README.md" --curve "$run/curve.csv" --measured "Real characters, test=$folder/measured"
