@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the released weights again, on a CPU or on a GPU where there is one: data, training, figures.
+# The recipe of the next weights, on a CPU or on a GPU where there is one: data, training, figures.
 #   docs/weights/make.sh FOLDER [more overrides of train.py]
 # FOLDER/meshes/{train,train_extra,val,test} hold the mesh files of docs/characters.md. Each step goes on where it was interrupted;
 # a data set that is there is not made again. A GPU has room for `scale=base trainer=gpu`.
