@@ -154,7 +154,7 @@ def evaluate(
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
     metrics = evaluate_split(
-        model.network,
+        model.any_size,
         model.renderer,
         data,
         split,

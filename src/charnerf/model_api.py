@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,11 +14,12 @@ import torch
 from charnerf.drawings.turnaround import Turnaround, read_turnaround
 from charnerf.errors import ConfigError, ShapeError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
+from charnerf.geometry.resizing import resized_views
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.lod import Lod, build_lods
 from charnerf.meshing.symmetry import symmetric_scene
 from charnerf.meshing.texture import TEXTURE_SIZE, Texturing
-from charnerf.models.charnerf import CharNeRF
+from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.types import Cameras, Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
@@ -61,6 +63,11 @@ class Model:
         """Where the networks are."""
         return self.network.box[0].device
 
+    @property
+    def any_size(self) -> AnySize:
+        """The network for views of any size."""
+        return AnySize(self.network, self.image_size)
+
     def to(self, device: torch.device | str) -> Model:
         """The model on another device; the networks move, they are not copied."""
         return replace(self, network=self.network.to(device))
@@ -85,10 +92,16 @@ class Model:
             DataError: If a drawing can not be used; the message names its file.
         """
         turnaround = read_turnaround(front, side, back, size=self.image_size, side_is=side_is)
-        return replace(self.encode_views(turnaround.views), turnaround=turnaround)
+        hero = self.encode_views(turnaround.views, detailed=turnaround.detailed)
+        return replace(hero, turnaround=turnaround)
 
-    def encode_views(self, views: SourceViews) -> Hero:
+    def encode_views(self, views: SourceViews, *, detailed: SourceViews | None = None) -> Hero:
         """Encode source views of one character, B = 1, that have their cameras already.
+
+        Args:
+            views: Of any size: they are encoded as large as the encoder was trained on.
+            detailed: The same views with more pixels, for the colours of large pictures; `views` themselves where those are
+                wider than the encoder's.
 
         Raises:
             ShapeError: If there is not exactly one character.
@@ -97,10 +110,44 @@ class Model:
             raise ShapeError(
                 f"views: found {views.images.shape[0]} characters, expected 1; encode them one by one."
             )
-        views = views.to(self.device)
+        views, finer = fitted(views.to(self.device), self.image_size)
+        detailed = finer if detailed is None else detailed.to(self.device)
         with torch.no_grad():
-            scene = self.network.scene(self.network.encode(views), 0)
-        return Hero(scene=scene, views=views, renderer=self.renderer)
+            scene = self.network.scene(self.network.encode(views, detailed=detailed), 0)
+        return Hero(scene=scene, views=views, renderer=self.renderer, detailed=detailed)
+
+
+def fitted(views: SourceViews, width: int) -> tuple[SourceViews, SourceViews | None]:
+    """Views of any size at the width that an encoder was trained on, and the views themselves where they are wider."""
+    if views.cameras.width == width:
+        return views, None
+    return resized_views(views, width), views if views.cameras.width > width else None
+
+
+@final
+@dataclass(frozen=True)
+class AnySize:
+    """A model's network for views of any size: what `evaluate` asks for.
+
+    Attributes:
+        network: The network.
+        width: Of the pictures that its encoder was trained on, pixels.
+    """
+
+    network: CharNeRF
+    width: int
+
+    def encode(self, views: SourceViews) -> EncodedViews:
+        """Encode views at the encoder's width."""
+        views, detailed = fitted(views, self.width)
+        return self.network.encode(views, detailed=detailed)
+
+    def scene(self, encoded: EncodedViews, index: int) -> Scene:
+        """A character's scene, coloured from the views as they were given."""
+        scene = self.network.scene(encoded, index)
+        if scene.at_width is None or encoded.detailed is None:
+            return scene
+        return scene.at_width(encoded.detailed.shape[-1])
 
 
 @final
@@ -113,15 +160,17 @@ class Hero:
         views: The drawings as source views, B = 1.
         renderer: How it is rendered.
         turnaround: What was assumed about the drawings; None where the views came with cameras.
+        detailed: The same views with more pixels, None where there are none; for textures and large pictures.
     """
 
     scene: Scene
     views: SourceViews
     renderer: AbstractRenderer
     turnaround: Turnaround | None = None
+    detailed: SourceViews | None = None
 
     def render(self, *, azimuth_deg: float, elevation_deg: float = 0.0, size: int = 256) -> np.ndarray:
-        """Render a view.
+        """Render a view, coloured from the drawings at the picture's resolution as far as they have it.
 
         Args:
             azimuth_deg: 0 front, 90 the character's left side, 180 back, 270 its right side.
@@ -138,9 +187,9 @@ class Hero:
             raise ConfigError(f"size: found {size}, expected at least 1 pixel.")
         if not np.isfinite((azimuth_deg, elevation_deg)).all():
             raise ConfigError(f"angles: found {azimuth_deg} and {elevation_deg}, expected finite degrees.")
-        finest = self.renderer.render_camera(
-            self.scene, self._camera(azimuth_deg, elevation_deg, size)
-        ).finest
+        camera = self._camera(azimuth_deg, elevation_deg, size)
+        with torch.no_grad():
+            finest = self.renderer.render_camera(self._scene_for(size), camera).finest
         opacity = finest.opacity.clamp(0.0, 1.0)[..., None]
         seen = finest.rgb - (1.0 - opacity)  # the background is white
         straight = torch.where(opacity > 1e-4, seen / opacity.clamp_min(1e-4), torch.ones_like(seen))
@@ -259,7 +308,7 @@ class Hero:
             return None
         if texture not in ("drawings", "field"):
             raise ConfigError(f"texture: found '{texture}', expected drawings, field or vertex.")
-        views = self.views if self.turnaround is None else self.turnaround.detailed
+        views = self.views if self.detailed is None else self.detailed
         return Texturing(colours=texture, size=size, views=views)
 
     def radius(self) -> float:
@@ -273,6 +322,16 @@ class Hero:
         cell = (hull.box_max - hull.box_min) / torch.tensor(hull.occupancy.shape, device=box_min.device)
         centres = hull.box_min + (occupied + 0.5) * cell
         return MARGIN * max(1.0, float((centres - box_min.new_tensor(CENTRE)).norm(dim=-1).max()))
+
+    def _scene_for(self, size: int) -> Scene:
+        """The scene for pictures of a size: a pixel of theirs covers as much as one of the drawings that it reads."""
+        if self.scene.at_width is None:
+            return self.scene
+        cameras = self.views.cameras[self.views.present]
+        distance = (cameras.world_from_camera[:, :3, 3] - cameras.focal.new_tensor(CENTRE)).norm(dim=-1)
+        metres = torch.where(cameras.orthographic, 1.0, distance) / cameras.focal[:, 0]  # that a pixel covers
+        across = cameras.width * float(metres.amax())
+        return self.scene.at_width(math.ceil(size * across / (2.0 * self.radius())))
 
     def _camera(self, azimuth_deg: float, elevation_deg: float, size: int) -> Cameras:
         """Pinhole camera of shape () that frames the character."""

@@ -199,6 +199,8 @@ class Scene:
             that look there first.
         bytes_a_point: Memory that the field takes for a point while it answers, bytes; chunks are bounded
             by it.
+        at_width: The same scene with its colours read from finer drawings, so many pixels wide, for large
+            pictures; None where no finer drawings were given.
     """
 
     coarse: FieldFunction
@@ -210,6 +212,7 @@ class Scene:
     densities_first: DensityFunction | None = None
     coarse_hull: Tensor | None = None
     bytes_a_point: int = 16_384
+    at_width: Callable[[int], Scene] | None = None
 
     def answer_densities(self, points: Tensor, view_dirs: Tensor) -> DensityAnswer:
         """Densities of the finest field at points (P, 3), its colours on demand; in two steps where it can."""

@@ -19,7 +19,6 @@ from charnerf.bench.headline import Comparison
 from charnerf.bench.hull_cut import cut_by_hull
 from charnerf.bench.kinds import KINDS
 from charnerf.bench.measure import in_turns
-from charnerf.bench.memory import resized
 from charnerf.bench.rendering import BASELINE, measure
 from charnerf.bench.roofline import IN_PLACE, roofline
 from charnerf.bench.scaling import exponent, grow
@@ -190,13 +189,6 @@ def test_untrained_networks_are_seeded_and_empty_of_training(tiny):
     for a, b in zip(first.parameters(), again.parameters(), strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=0)
     assert any(not torch.equal(a, b) for a, b in zip(first.parameters(), other.parameters(), strict=True))
-
-
-def test_a_resized_camera_sees_the_same():
-    camera = helpers.target_cameras(2, size=16)[0]
-    large = resized(camera, 64)
-    torch.testing.assert_close(large.focal, 4 * camera.focal)
-    assert large.width == large.height == 64
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -88,6 +88,14 @@ def test_tensorboards_own_reader_finds_everything(run_folder):
     assert b"val/psnr_foreground" in events.summary_metadata["_hparams_/experiment"].plugin_data.content
 
 
+def test_pictures_of_another_size_are_told_before_training(figure_dataset, tmp_path):
+    cfg = small_runs.smoke_config(figure_dataset, "scale.image_size=64")
+    with pytest.raises(
+        ConfigError, match=r"scale\.image_size: found 64, expected 32.*Set scale\.image_size=32"
+    ):
+        run_training(cfg, tmp_path / "run")
+
+
 def test_a_checkpoint_is_found_or_named(run_folder, tmp_path):
     last = run_folder / "checkpoints/last.ckpt"
     assert find_checkpoint(None, tmp_path) is None

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 import torch
-from torch.nn import functional as F
 
 from charnerf import runs
 from charnerf.bench.architectures import architecture_rows, large_network, network_of, step_at_scale
@@ -32,6 +31,7 @@ from charnerf.bench.sweeps import (
 )
 from charnerf.bench.training_step import compared_curves, loss_curves
 from charnerf.bench.workbench import settings_of
+from charnerf.geometry.resizing import resized_views
 from charnerf.types import Cameras, SourceViews
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
@@ -90,27 +90,12 @@ def _kinds(setting: Setting) -> dict[str, Any]:
     return {kind: [row.as_dict() for row in rows] for kind, rows in found.items()}
 
 
-def _resized_drawings(views: SourceViews, side: int) -> SourceViews:
-    """Drawings of another resolution, their cameras with them."""
-    factor = side / views.images.shape[-1]
-    flat = views.images.flatten(0, 1)
-    images = F.interpolate(flat, size=(side, side), mode="bilinear", align_corners=False, antialias=True)
-    cameras = replace(
-        views.cameras,
-        focal=views.cameras.focal * factor,
-        principal_point=views.cameras.principal_point * factor,
-        width=side,
-        height=side,
-    )
-    return replace(views, images=images.clamp(0.0, 1.0).unflatten(0, views.present.shape), cameras=cameras)
-
-
 def _resolutions(setting: Setting) -> list[dict[str, Any]]:
     """Error and seconds by the side of the drawings; the reference is that of the drawings as they are."""
     bench, pictured = setting.bench, setting.pictured[0]
     rows = []
     for side in SOURCE_SIDES:
-        views = _resized_drawings(pictured.views, side)
+        views = resized_views(pictured.views, side)
         one = subject(replace(pictured, views=views), bench.network, kind=str(side), num_pixels=NUM_PIXELS)
         start = time.perf_counter()
         with torch.no_grad():

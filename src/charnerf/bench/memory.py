@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import torch
@@ -11,9 +11,9 @@ import torch
 from charnerf.bench.subjects import Pictured
 from charnerf.evaluation.timing import Stopwatch, process_peak_mib
 from charnerf.geometry.cameras import pixel_centres
+from charnerf.geometry.resizing import resized_cameras
 from charnerf.meshing.build import build_mesh
 from charnerf.models.charnerf import CharNeRF
-from charnerf.types import Cameras
 from charnerf.volume.renderers.base import AbstractRenderer
 
 Work = Literal["render", "mesh"]
@@ -59,8 +59,10 @@ def _measure(
     views = pictured.views.to(device)
     with torch.no_grad():
         scene = network.scene(network.encode(views), 0)
-        camera = resized(pictured.camera.to(device), size)
-        renderer.render_camera(scene, resized(camera, 16))  # what is allocated once is no part of it
+        camera = resized_cameras(pictured.camera.to(device), size, size)
+        renderer.render_camera(
+            scene, resized_cameras(camera, 16, 16)
+        )  # what is allocated once is no part of it
     with Stopwatch(device) as watch:
         with watch.stage("before"):
             pixel_centres(4, 4)
@@ -72,15 +74,3 @@ def _measure(
                 build_mesh(scene, views, resolution=size)
         peak = watch.peaks_mib().get("work", process_peak_mib())
     return PeakMemory(rise_mib=peak - before, seconds=watch.total_seconds("work"))
-
-
-def resized(camera: Cameras, size: int) -> Cameras:
-    """The same view with size x size pixels."""
-    factor = size / max(camera.width, camera.height)
-    return replace(
-        camera,
-        focal=camera.focal * factor,
-        principal_point=camera.principal_point * factor,
-        width=size,
-        height=size,
-    )

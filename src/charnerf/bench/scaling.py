@@ -12,9 +12,9 @@ import torch
 
 from charnerf.bench.grids import CUBE_SIDE, grid_sampler
 from charnerf.bench.headline import ADAPTIVE, CULLED, Workbench
-from charnerf.bench.memory import resized
 from charnerf.bench.subjects import Pictured, Subject
 from charnerf.evaluation.timing import Stopwatch
+from charnerf.geometry.resizing import resized_cameras
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import SourceViews
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -104,7 +104,7 @@ def growths(
     adaptive = bench.renderers[ADAPTIVE]
 
     def picture(size: int) -> Callable[[], Any]:
-        return lambda: adaptive.render_camera(subject.scene, resized(subject.camera, size))
+        return lambda: adaptive.render_camera(subject.scene, resized_cameras(subject.camera, size, size))
 
     def grid(size: int) -> Callable[[], Any]:
         return lambda: grid_sampler(subject, size, 8).evaluate_surface(50.0)

@@ -45,6 +45,7 @@ def symmetric_scene(scene: Scene) -> Scene:
 
     field = _symmetric_field(scene)
     hull = None if scene.hull is None else symmetric_hull(scene.hull)
+    at_width = scene.at_width
     return replace(
         scene,
         coarse=field,
@@ -52,6 +53,7 @@ def symmetric_scene(scene: Scene) -> Scene:
         hull=hull,
         densities_first=densities,
         coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
+        at_width=None if at_width is None else lambda width: symmetric_scene(at_width(width)),
     )
 
 

@@ -1,7 +1,7 @@
 """The model: drawings -> encoder -> feature maps -> scenes that answer points with colour and density."""
 
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import final
 
 import torch
@@ -10,12 +10,13 @@ from torch import Tensor, nn
 from charnerf.errors import ShapeError
 from charnerf.geometry.hull import build_hull
 from charnerf.geometry.occupied import coarse_occupancy
+from charnerf.geometry.resizing import resized_pictures
 from charnerf.models.encoders.base import AbstractEncoder
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import ViewMaps
+from charnerf.models.view_maps import ViewMaps, on_white
 from charnerf.models.views.base import AbstractViews
 from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
 
@@ -31,11 +32,13 @@ class EncodedViews(TensorRecord):
         views: The source views used, (B, V), mirrored ones included.
         feature_maps: W^i = E(I_i), (B, V, F, h, w).
         hull: Their hulls, or None for a model without.
+        detailed: The views used on white with more pixels, (B, V, 3, H', W'), or None where there are none.
     """
 
     views: SourceViews
     feature_maps: Tensor
     hull: Hull | None
+    detailed: Tensor | None = None
 
 
 @final
@@ -92,18 +95,21 @@ class CharNeRF(nn.Module):
         box_min, box_max = (corner.to(views.images) for corner in self.box)  # data carves on its own device
         return build_hull(self.views(views), box_min=box_min, box_max=box_max)
 
-    def encode(self, views: SourceViews, hull: Hull | None = None) -> EncodedViews:
+    def encode(
+        self, views: SourceViews, hull: Hull | None = None, *, detailed: SourceViews | None = None
+    ) -> EncodedViews:
         """Encode characters once.
 
         Args:
             views: Drawings, (B, V), V from 1 to 8; padded views are marked absent.
             hull: Their hulls from `carve`, carved here if not given.
+            detailed: The same drawings with more pixels: `Scene.at_width` then reads colours from them.
 
         Returns:
             What `scene` needs.
 
         Raises:
-            ShapeError: If the pictures' sides do not suit the encoder.
+            ShapeError: If the pictures' sides do not suit the encoder, or the detailed ones are other views.
         """
         height, width = views.images.shape[-2:]
         multiple = self.encoder.multiple
@@ -115,23 +121,51 @@ class CharNeRF(nn.Module):
         if hull is None:
             hull = self.carve(views)
         used = self.views(views)
-        rgb, alpha = used.images[:, :, :3], used.images[:, :, 3:]
-        on_white = rgb * alpha + (1.0 - alpha)
-        pixels = torch.cat((2.0 * on_white - 1.0, 2.0 * alpha - 1.0), dim=2).flatten(0, 1)
+        alpha = used.images[:, :, 3:]
+        pixels = torch.cat((2.0 * on_white(used.images) - 1.0, 2.0 * alpha - 1.0), dim=2).flatten(0, 1)
         maps = self.encoder(pixels.contiguous(memory_format=torch.channels_last))
-        return EncodedViews(views=used, feature_maps=maps.unflatten(0, used.present.shape), hull=hull)
+        return EncodedViews(
+            views=used,
+            feature_maps=maps.unflatten(0, used.present.shape),
+            hull=hull,
+            detailed=None if detailed is None else self._detail_of(used, detailed),
+        )
 
-    def scene(self, encoded: EncodedViews, index: int) -> Scene:
-        """One character of a batch as a scene for a renderer; its absent views are dropped here."""
+    def _detail_of(self, used: SourceViews, detailed: SourceViews) -> Tensor:
+        """The views used with more pixels, on white."""
+        images = self.views(detailed).images
+        (height, width), (tall, wide) = used.images.shape[-2:], images.shape[-2:]
+        if images.shape[:2] != used.images.shape[:2] or tall * width != wide * height:
+            raise ShapeError(
+                f"detailed: found images {tuple(images.shape)}, expected the same views as {tuple(used.images.shape)}, of the "
+                "same proportions."
+            )
+        return on_white(images)
+
+    def scene(self, encoded: EncodedViews, index: int, *, width: int | None = None) -> Scene:
+        """One character of a batch as a scene for a renderer; its absent views are dropped here.
+
+        Args:
+            encoded: Characters.
+            index: Which of them.
+            width: Pixels across the drawings that colours are read from, at most those of the detailed ones; None
+                reads the pictures that were encoded.
+        """
         views = encoded.views[index]
         present = views.present.nonzero()[:, 0]
         views = views[present]
         hull = encoded.hull[index] if encoded.hull is not None else None
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
+        encoded_width, detailed = encoded.views.cameras.width, encoded.detailed
+        finer = None
+        if detailed is not None and width is not None and width > encoded_width:
+            finer, wide = detailed[index][present], min(width, detailed.shape[-1])
+            tall = round(wide * finer.shape[-2] / finer.shape[-1])
+            finer = resized_pictures(finer, wide, tall) if wide < finer.shape[-1] else finer
         answer = partial(
             self.point_inputs,
-            maps=self.view_maps(views, hull, present, maps),
+            maps=self.view_maps(views, hull, present, maps, finer),
             mirrored=views.mirrored.to(maps.dtype),
         )
 
@@ -157,12 +191,22 @@ class CharNeRF(nn.Module):
             densities_first=densities,
             coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
             bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
+            at_width=None
+            if detailed is None
+            else lru_cache(maxsize=1)(lambda across: self.scene(encoded, index, width=across)),
         )
 
-    def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
-        """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
+    def view_maps(
+        self,
+        views: SourceViews,
+        hull: Hull | None,
+        present: Tensor,
+        maps: Tensor,
+        finer: Tensor | None = None,
+    ) -> ViewMaps:
+        """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w), finer as of `ViewMaps.of`."""
         size = (maps.shape[-1], maps.shape[-2])
-        return ViewMaps.of(views, hull, present, size, sections=self.features.reads_sections)
+        return ViewMaps.of(views, hull, present, size, sections=self.features.reads_sections, finer=finer)
 
     def point_inputs(
         self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor
@@ -187,7 +231,7 @@ class CharNeRF(nn.Module):
         return PointInputs(
             latents=sight.latents,
             extras=self.features(readings),
-            source_rgb=sight.rgb,
+            source_rgb=sight.finer_rgb,
             visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
             valid=sight.valid,
             encoded_points=self.coarse.single_view.locate(

@@ -22,7 +22,8 @@ class Sight:
 
     Attributes:
         latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
-        rgb: (P, V, 3), colour of the drawings.
+        rgb: (P, V, 3), colour of the drawings as they were encoded.
+        finer_rgb: (P, V, 3), colour of the drawings with as many pixels as are to be had.
         front: (P, V), m, distance of the hull's front along the view's ray.
         edge: (P, V), pixels, distance from the mask's edge.
         along_ray: (P, V), m, distance of the point along the view's ray.
@@ -32,6 +33,7 @@ class Sight:
 
     latents: Tensor
     rgb: Tensor
+    finer_rgb: Tensor
     front: Tensor | None
     edge: Tensor | None
     along_ray: Tensor
@@ -49,6 +51,8 @@ class ViewMaps:
         map_size: Width and height of the feature maps.
         pictures: Rows (V * H * W, 3), or (V * H * W, 5) where the hull's maps have the pictures' size and
             lie beside the colours.
+        finer: Rows (V * H' * W', 3) of the same pictures with more pixels, None where there are none.
+        finer_size: Width and height of those.
         hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
             without a hull or where
             they lie beside the colours.
@@ -60,6 +64,8 @@ class ViewMaps:
     parallel: bool
     map_size: tuple[int, int]
     pictures: Tensor
+    finer: Tensor | None
+    finer_size: tuple[int, int]
     hull_rows: Tensor | None
     hull_size: tuple[int, int]
     sections: CrossSections | None
@@ -73,6 +79,7 @@ class ViewMaps:
         map_size: tuple[int, int],
         *,
         sections: bool,
+        finer: Tensor | None = None,
     ) -> "ViewMaps":
         """Prepare present views (V, ...) and the maps that their hull keeps of them.
 
@@ -82,9 +89,9 @@ class ViewMaps:
             present: Indices of the views in the hull's maps, (V,).
             map_size: Width and height of the feature maps.
             sections: Whether to measure the hull's cross-sections.
+            finer: The same views on white with more pixels, (V, 3, H', W'), for the colours alone.
         """
-        rgb, alpha = views.images[:, :3], views.images[:, 3:]
-        pictures, rows, size = rgb * alpha + (1.0 - alpha), None, (0, 0)
+        pictures, rows, size = on_white(views.images), None, (0, 0)
         if hull is not None:
             maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
             size = (maps.shape[-1], maps.shape[-2])
@@ -97,6 +104,8 @@ class ViewMaps:
             parallel=bool(views.cameras.orthographic.all()),
             map_size=map_size,
             pictures=maps_to_rows(pictures),
+            finer=None if finer is None else maps_to_rows(finer),
+            finer_size=(0, 0) if finer is None else (finer.shape[-1], finer.shape[-2]),
             hull_rows=rows,
             hull_size=size,
             sections=cross_sections(hull) if sections and hull is not None else None,
@@ -119,6 +128,7 @@ class ViewMaps:
         return Sight(
             latents=read.unflatten(0, leading),
             rgb=seen[..., :3],
+            finer_rgb=self._finer(pixels / size, seen),
             front=front,
             edge=edge,
             along_ray=along_ray,
@@ -132,6 +142,14 @@ class ViewMaps:
             nothing = torch.zeros_like(points)
             return nothing, nothing
         return read_cross_sections(self.sections, points)
+
+    def _finer(self, shares: Tensor, seen: Tensor) -> Tensor:
+        """Colours (P, V, 3) at places in the pictures, shares of their sides (P, V, 2)."""
+        if self.finer is None:
+            return seen[..., :3]
+        width, height = self.finer_size
+        own = bilinear_rows(shares * shares.new_tensor(self.finer_size), width=width, height=height)
+        return read_rows(self.finer, *own).unflatten(0, seen.shape[:2])
 
     def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
@@ -153,3 +171,9 @@ class ViewMaps:
         distance = (points[:, None] - centres).norm(dim=-1)
         along = torch.where(self.cameras.orthographic, depth, distance)
         return directions_to_points(self.cameras, points), along
+
+
+def on_white(images: Tensor) -> Tensor:
+    """Straight-alpha RGBA (..., 4, H, W) on white, (..., 3, H, W)."""
+    rgb, alpha = images[..., :3, :, :], images[..., 3:, :, :]
+    return rgb * alpha + (1.0 - alpha)

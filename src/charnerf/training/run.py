@@ -15,7 +15,9 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard.summary import hparams
 
+from charnerf.data.characters import load_character
 from charnerf.data.datamodule import MixedDataModule
+from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset, SurfaceOf
 from charnerf.data.sampler import PhaseSampler
 from charnerf.data.store import CharacterStore, OpenCharacter
@@ -56,6 +58,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     save_config(folder, cfg)
     losses: WeightedLosses = build_part(cfg.loss)
     root = build_part(cfg.data).prepare(depth=reads(cfg, losses, "depth"))
+    check_picture_size(root, cfg.sampling.train_splits[0], cfg.scale.image_size)
     model = build_model(cfg)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
@@ -88,6 +91,22 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     if trainer.is_global_zero:
         save_weights(folder / "weights.safetensors", model, cfg)
         finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
+
+
+def check_picture_size(root: Path, split: str, size: int) -> None:
+    """Check that the encoder is trained on drawings of the size that `charnerf reconstruct` will give it.
+
+    Raises:
+        ConfigError: If the first character's drawings have another size.
+    """
+    name = names_of(read_dataset(root), split)[0]
+    cameras = load_character(root, name).sources.cameras
+    found = max(cameras.width, cameras.height)
+    if found != size:
+        raise ConfigError(
+            f"scale.image_size: found {size}, expected {found}, the size of the drawings of {root} ({name}: {cameras.width} x "
+            f"{cameras.height} pixels). Set scale.image_size={found}, or capture with --size {size}."
+        )
 
 
 def build_data(
