@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from charnerf.models.fused import read_bags, residual_rows, score_rows, sum_views
+from charnerf.models.fused import pair_dots, read_bags, residual_rows, score_rows, sum_views
 
 
 def rand(*shape: int) -> Tensor:
@@ -49,6 +49,27 @@ def test_score_rows(rows: int) -> None:
 
     assert_equal_with_gradients(
         score_rows, plain, rand(rows, 8), rand(rows, 5), rand(5, 8), rand(5), rand(1, 5), rand(1)
+    )
+
+
+@pytest.mark.parametrize("points", [0, 1, 13])
+@pytest.mark.parametrize("views", [1, 3, 8])
+def test_pair_dots(views: int, points: int) -> None:
+    assert_equal_with_gradients(
+        pair_dots,
+        lambda q, k: torch.einsum("pvhd,pwhd->pvwh", q, k),
+        rand(points, views, 2, 5),
+        rand(points, views, 2, 5) + 1.0,
+    )
+
+
+@pytest.mark.parametrize("views", [1, 3])
+def test_sum_views_by_head(views: int) -> None:
+    assert_equal_with_gradients(
+        sum_views,
+        lambda w, f: (w[..., None] * f).sum(1),
+        rand(11, 2, views).transpose(1, 2),
+        rand(11, views, 2, 6),
     )
 
 

@@ -4,7 +4,7 @@ At width 64 a step on a CPU waits for memory more than for arithmetic. Each func
 rounding, values and gradients. They work on two dimensions: what a linear layer makes of three is a view, and the
 gradient of a view changed in place copies the whole tensor several times.
 
-Letters: N rows, D and H widths, P points, V views, Q readings.
+Letters: N rows, D and H widths, P points, V views, K heads, Q readings.
 """
 
 from typing import Any
@@ -34,12 +34,25 @@ def score_rows(x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor,
 
 
 def sum_views(weights: Tensor, features: Tensor) -> Tensor:
-    """Sum over the views of weights (P, V) times features (P, V, D): (P, D)."""
+    """Sum over the views of weights (P, V, ...) times features (P, V, ..., D): (P, ..., D)."""
     if torch.is_autocast_enabled(features.device.type):
         return (weights[..., None] * features).sum(1)
     if not torch.is_grad_enabled():
         return _sum_views(weights, features)
     return _SumViews.apply(weights, features)  # type: ignore[no-any-return, no-untyped-call]
+
+
+def pair_dots(queries: Tensor, keys: Tensor) -> Tensor:
+    """Dot products of every view's query with every view's key, (P, V, K, D) each: (P, V query, V key, K).
+
+    Pair by pair: with three or four views a batched matrix product costs far more than its arithmetic, and one product of all
+    pairs is V times as large as the features.
+    """
+    if torch.is_autocast_enabled(queries.device.type):
+        return (queries[:, :, None] * keys[:, None]).sum(-1)
+    if not torch.is_grad_enabled():
+        return _pair_dots(queries, keys)
+    return _PairDots.apply(queries, keys)  # type: ignore[no-any-return, no-untyped-call]
 
 
 def read_bags(rows: Tensor, indices: Tensor, weights: Tensor) -> Tensor:
@@ -66,10 +79,19 @@ def _score(
 
 def _sum_views(weights: Tensor, features: Tensor) -> Tensor:
     """View by view: fewer passes over memory than a product and a sum, far fewer than a batched matrix product."""
-    total = features[:, 0] * weights[:, :1]
+    total = features[:, 0] * weights[:, 0, ..., None]
     for view in range(1, features.shape[1]):
-        total.addcmul_(features[:, view], weights[:, view, None])
+        total.addcmul_(features[:, view], weights[:, view, ..., None])
     return total
+
+
+def _pair_dots(queries: Tensor, keys: Tensor) -> Tensor:
+    product = torch.empty_like(queries[:, 0])
+    dots = queries.new_empty(queries.shape[0], keys.shape[1], keys.shape[1], keys.shape[2])
+    for i, query in enumerate(queries.unbind(1)):
+        for j, key in enumerate(keys.unbind(1)):
+            torch.sum(torch.mul(query, key, out=product), -1, out=dots[:, i, j])
+    return dots
 
 
 class _Residual(torch.autograd.Function):
@@ -118,6 +140,21 @@ class _SumViews(torch.autograd.Function):
         weights, features = ctx.saved_tensors
         shares = torch.stack([(one * grad).sum(-1) for one in features.unbind(1)], dim=1)
         return shares, grad[:, None] * weights[..., None]
+
+
+class _PairDots(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, queries: Tensor, keys: Tensor) -> Tensor:
+        ctx.save_for_backward(queries, keys)
+        return _pair_dots(queries, keys)
+
+    @staticmethod
+    @once_differentiable  # type: ignore[no-untyped-call, untyped-decorator]
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, ...]:
+        queries, keys = ctx.saved_tensors
+        to_queries = [_sum_views(grad[:, i], keys) for i in range(queries.shape[1])]
+        to_keys = [_sum_views(grad[:, :, j], queries) for j in range(keys.shape[1])]
+        return torch.stack(to_queries, dim=1), torch.stack(to_keys, dim=1)
 
 
 class _Bags(torch.autograd.Function):

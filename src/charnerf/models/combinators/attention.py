@@ -6,6 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import masked_logits, view_weights
+from charnerf.models.fused import pair_dots, sum_views
 
 
 class AttentionParts(nn.Module):
@@ -49,11 +50,8 @@ class AttentionParts(nn.Module):
         return x.unflatten(-1, (self.num_heads, -1))
 
     def feature_logits(self, queries: Tensor, keys: Tensor) -> Tensor:
-        """Dot products of every query with every key, (P, K, V query, V key), times the temperature.
-
-        Written as sums: with three or four views a general matrix product costs far more than its arithmetic.
-        """
-        logits = (queries[:, :, None] * keys[:, None]).sum(-1).permute(0, 3, 1, 2)
+        """Dot products of every query with every key, (P, K, V query, V key), times the temperature."""
+        logits = pair_dots(queries, keys).permute(0, 3, 1, 2)
         return logits if self.log_temperature is None else logits * self.log_temperature.exp()
 
     def attend(self, logits: Tensor, view_features: Tensor, valid: Tensor) -> Tensor:
@@ -63,9 +61,9 @@ class AttentionParts(nn.Module):
         row_weights = view_weights(valid, weights.dtype)
         averaged = (weights * row_weights[:, None, :, None]).sum(2)  # (P, K, V key)
         values = self.split(self.values(view_features))
-        fused = (averaged.transpose(1, 2)[..., None] * values).sum(1).flatten(-2)  # (P, A)
+        fused = sum_views(averaged.transpose(1, 2), values).flatten(-2)  # (P, A)
         if self.output is not None:
             fused = self.output(fused)
         if self.is_residual:
-            fused = fused + (view_features * row_weights[..., None]).sum(1)
+            fused = fused + sum_views(row_weights, view_features)
         return fused if self.norm is None else self.norm(fused)
