@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from omegaconf import OmegaConf
 
 import helpers
 import tiny_models
@@ -33,7 +34,8 @@ def _model(*, fine: bool = False, shaken: bool = True, **parts) -> Model:
         hull_steps=32,
         memory_mib=64,
     )
-    return Model(network.requires_grad_(False).eval(), renderer, None, Path("weights.safetensors"))
+    config = OmegaConf.create({"model": {"image_size": helpers.SIZE}})
+    return Model(network.requires_grad_(False).eval(), renderer, config, Path("weights.safetensors"))
 
 
 @pytest.mark.parametrize("density", ["view_free", "view_dependent"])
