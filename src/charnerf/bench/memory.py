@@ -60,9 +60,8 @@ def _measure(
     with torch.no_grad():
         scene = network.scene(network.encode(views), 0)
         camera = resized_cameras(pictured.camera.to(device), size, size)
-        renderer.render_camera(
-            scene, resized_cameras(camera, 16, 16)
-        )  # what is allocated once is no part of it
+        # what is allocated once is no part of it
+        renderer.render_camera(scene, resized_cameras(camera, 16, 16))
     with Stopwatch(device) as watch:
         with watch.stage("before"):
             pixel_centres(4, 4)

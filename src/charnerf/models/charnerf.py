@@ -1,8 +1,9 @@
 """The model: drawings -> encoder -> feature maps -> scenes that answer points with colour and density."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import final
+from typing import Any, final
 
 import torch
 from torch import Tensor, nn
@@ -10,7 +11,6 @@ from torch import Tensor, nn
 from charnerf.errors import ShapeError
 from charnerf.geometry.hull import build_hull
 from charnerf.geometry.occupied import coarse_occupancy
-from charnerf.geometry.resizing import resized_pictures
 from charnerf.models.encoders.base import AbstractEncoder
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
@@ -142,71 +142,58 @@ class CharNeRF(nn.Module):
             )
         return on_white(images)
 
-    def scene(self, encoded: EncodedViews, index: int, *, width: int | None = None) -> Scene:
-        """One character of a batch as a scene for a renderer; its absent views are dropped here.
-
-        Args:
-            encoded: Characters.
-            index: Which of them.
-            width: Pixels across the drawings that colours are read from, at most those of the detailed ones; None
-                reads the pictures that were encoded.
-        """
+    def scene(self, encoded: EncodedViews, index: int) -> Scene:
+        """One character of a batch as a scene for a renderer; its absent views are dropped here."""
         views = encoded.views[index]
         present = views.present.nonzero()[:, 0]
         views = views[present]
         hull = encoded.hull[index] if encoded.hull is not None else None
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
-        encoded_width, detailed = encoded.views.cameras.width, encoded.detailed
-        finer = None
-        if detailed is not None and width is not None and width > encoded_width:
-            finer, wide = detailed[index][present], min(width, detailed.shape[-1])
-            tall = round(wide * finer.shape[-2] / finer.shape[-1])
-            finer = resized_pictures(finer, wide, tall) if wide < finer.shape[-1] else finer
-        answer = partial(
-            self.point_inputs,
-            maps=self.view_maps(views, hull, present, maps, finer),
-            mirrored=views.mirrored.to(maps.dtype),
-        )
+        latents = self.coarse.hoist(rows), None if self.fine is None else self.fine.hoist(rows)
+        answer = partial(self.point_inputs, mirrored=views.mirrored.to(maps.dtype))
 
-        def field_of(field: Field) -> tuple[FieldFunction, DensityFunction]:
-            inputs = partial(answer, latents=field.hoist(rows))
+        def field_of(
+            field: Field, inputs: Callable[[Tensor, Tensor], PointInputs]
+        ) -> tuple[FieldFunction, DensityFunction]:
             return (
                 lambda points, view_dirs: field(inputs(points, view_dirs)),
                 lambda points, view_dirs: field.densities(inputs(points, view_dirs)),
             )
 
-        coarse, densities = field_of(self.coarse)
-        fine = None
-        if self.fine is not None:
-            fine, densities = field_of(self.fine)
+        def fields_of(seen: ViewMaps) -> dict[str, Any]:
+            """The scene's fields, looking at some maps."""
+            coarse, densities = field_of(self.coarse, partial(answer, maps=seen, latents=latents[0]))
+            fine = None
+            if self.fine is not None:
+                fine, densities = field_of(self.fine, partial(answer, maps=seen, latents=latents[1]))
+            return {"coarse": coarse, "fine": fine, "densities_first": densities}
+
+        seen = self.view_maps(views, hull, present, maps)
         box_min, box_max = self.box
-        return Scene(
-            coarse=coarse,
-            fine=fine,
+        scene = Scene(
+            **fields_of(seen),
             hull=hull,
             box_min=box_min,
             box_max=box_max,
             density_sees_directions=self.coarse.density.sees_directions,
-            densities_first=densities,
             coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
             bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
-            at_width=None
-            if detailed is None
-            else lru_cache(maxsize=1)(lambda across: self.scene(encoded, index, width=across)),
         )
+        if encoded.detailed is None:
+            return scene
+        detailed = encoded.detailed[index][present]
 
-    def view_maps(
-        self,
-        views: SourceViews,
-        hull: Hull | None,
-        present: Tensor,
-        maps: Tensor,
-        finer: Tensor | None = None,
-    ) -> ViewMaps:
-        """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w), finer as of `ViewMaps.of`."""
+        @lru_cache(maxsize=1)
+        def at_width(width: int) -> Scene:
+            return replace(scene, **fields_of(seen.with_finer(detailed, width)))
+
+        return replace(scene, at_width=at_width)
+
+    def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
+        """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
         size = (maps.shape[-1], maps.shape[-2])
-        return ViewMaps.of(views, hull, present, size, sections=self.features.reads_sections, finer=finer)
+        return ViewMaps.of(views, hull, present, size, sections=self.features.reads_sections)
 
     def point_inputs(
         self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor

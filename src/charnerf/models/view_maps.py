@@ -5,13 +5,14 @@ drawings on white, maps of
 the hull) is computed here once a character instead of once a sample.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from charnerf.geometry.cameras import directions_to_points, project_into_all
 from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
+from charnerf.geometry.resizing import resized_pictures
 from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
 from charnerf.types import Cameras, Hull, SourceViews
 
@@ -79,7 +80,6 @@ class ViewMaps:
         map_size: tuple[int, int],
         *,
         sections: bool,
-        finer: Tensor | None = None,
     ) -> "ViewMaps":
         """Prepare present views (V, ...) and the maps that their hull keeps of them.
 
@@ -89,7 +89,6 @@ class ViewMaps:
             present: Indices of the views in the hull's maps, (V,).
             map_size: Width and height of the feature maps.
             sections: Whether to measure the hull's cross-sections.
-            finer: The same views on white with more pixels, (V, 3, H', W'), for the colours alone.
         """
         pictures, rows, size = on_white(views.images), None, (0, 0)
         if hull is not None:
@@ -104,12 +103,25 @@ class ViewMaps:
             parallel=bool(views.cameras.orthographic.all()),
             map_size=map_size,
             pictures=maps_to_rows(pictures),
-            finer=None if finer is None else maps_to_rows(finer),
-            finer_size=(0, 0) if finer is None else (finer.shape[-1], finer.shape[-2]),
+            finer=None,
+            finer_size=(0, 0),
             hull_rows=rows,
             hull_size=size,
             sections=cross_sections(hull) if sections and hull is not None else None,
         )
+
+    def with_finer(self, pictures: Tensor, width: int) -> "ViewMaps":
+        """The same maps with their colours read from pictures (V, 3, H', W') on white.
+
+        They are shrunk to a width where they are wider; where it is no more than that of the pictures here, those stay.
+        """
+        tall, wide = pictures.shape[-2:]
+        if width <= self.cameras.width:
+            return self
+        if width < wide:
+            pictures = resized_pictures(pictures, width, round(width * tall / wide))
+        size = (pictures.shape[-1], pictures.shape[-2])
+        return replace(self, finer=maps_to_rows(pictures), finer_size=size)
 
     def look(self, points: Tensor, latents: Tensor) -> Sight:
         """Read features (rows (V * h * w, D)), drawings and hull maps at points (P, 3)."""
@@ -123,12 +135,13 @@ class ViewMaps:
         seen = read_rows(
             self.pictures, *bilinear_rows(pixels, width=cameras.width, height=cameras.height)
         ).unflatten(0, leading)
-        front, edge = self._hull_readings(pixels / size, seen)
+        shares = pixels / size
+        front, edge = self._hull_readings(shares, seen)
         directions, along_ray = self._directions(points, depth)
         return Sight(
             latents=read.unflatten(0, leading),
             rgb=seen[..., :3],
-            finer_rgb=self._finer(pixels / size, seen),
+            finer_rgb=self._finer(shares, seen),
             front=front,
             edge=edge,
             along_ray=along_ray,
