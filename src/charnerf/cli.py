@@ -89,7 +89,14 @@ def capture(
             help="Capture so many variants of each mesh instead of it: other proportions, other poses, NAME+1, NAME+2, ...",
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same variants.")] = 0,
+    swaps: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            help="Capture so many characters with each mesh's body and other given meshes' heads and legs: NAME+s1, ...",
+        ),
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same variants and swaps.")] = 0,
     jobs: Jobs = None,
 ) -> None:
     """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
@@ -111,6 +118,7 @@ def capture(
         light=light,
         depth=depth,
         variants=variants,
+        swaps=swaps,
         seed=seed,
         jobs=jobs,
     )

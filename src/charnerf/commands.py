@@ -95,6 +95,7 @@ def capture(
     light: str,
     depth: bool,
     variants: int,
+    swaps: int,
     seed: int,
     jobs: int | None,
 ) -> None:
@@ -106,7 +107,15 @@ def capture(
     options = CaptureOptions(views=views, size=size, sources=sources, depth=depth, light=LIGHTS[light]())  # type: ignore[arg-type]
     axes = {"up": up, "facing": facing}
     done = capture_dataset(
-        meshes, output, split, options=options, variants=variants, seed=seed, processes=jobs, **axes
+        meshes,
+        output,
+        split,
+        options=options,
+        variants=variants,
+        swaps=swaps,
+        seed=seed,
+        processes=jobs,
+        **axes,
     )
     say(f"{len(done.captured)} characters captured into {output}, split {split}.")
     if done.captured:

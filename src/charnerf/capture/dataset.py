@@ -15,6 +15,7 @@ from tqdm import tqdm
 from charnerf.capture.embree import CaptureOptions, capture_character
 from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
 from charnerf.capture.parallel import in_processes
+from charnerf.capture.part_swaps import swap_parts
 from charnerf.capture.variants import SEPARATOR, variant
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
@@ -22,6 +23,8 @@ from charnerf.data.mesh_files import write_surface_mesh
 from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import CharNeRFError, DataError
+
+_SWAPPED = "s"
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ def capture_dataset(
     up: str | None = None,
     facing: str | None = None,
     variants: int = 0,
+    swaps: int = 0,
     seed: int = 0,
     processes: int | None = None,
 ) -> CaptureReport:
@@ -59,7 +63,9 @@ def capture_dataset(
         up: Axis that points up in all files; None for each format's own.
         facing: Signed axis that the characters face; None for each format's own.
         variants: Capture this many variants of each mesh instead of it (capture/variants.py), named NAME+1, NAME+2, ...
-        seed: What variants are drawn from; the same seed gives the same ones, however many.
+        swaps: Capture this many characters with each mesh's body and the head and legs of other meshes given instead of it
+            (capture/part_swaps.py), named NAME+s1, NAME+s2, ...
+        seed: What variants and parts are drawn from; the same seed gives the same ones, however many.
         processes: Worker processes; None for one a core.
 
     Returns:
@@ -75,13 +81,15 @@ def capture_dataset(
     check_name("split", split)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
-    items = [
-        _Item(file, number) for file in files for number in (range(1, variants + 1) if variants else (0,))
-    ]
+    changes = [str(number) for number in range(1, variants + 1)]
+    changes += [f"{_SWAPPED}{number}" for number in range(1, swaps + 1)]
+    items = [_Item(file, change) for file in files for change in changes or [""]]
     refuse_taken_names(open_or_new(root), [item.name for item in items])
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
-    work = partial(_capture_item, root=root, options=options, up=up, facing=facing, seed=seed)
+    work = partial(
+        _capture_item, root=root, options=options, donors=sorted(files), up=up, facing=facing, seed=seed
+    )
     messages: dict[_Item, str | None] = {}
     facts = made_by(options)
     try:
@@ -164,25 +172,39 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Item:
-    """A mesh file, as it is (0) or one of its variants."""
+    """A mesh file, as it is ("") or changed: "2" is its second variant, "s2" its second exchange of parts."""
 
     file: Path
-    number: int
+    change: str
 
     @property
     def name(self) -> str:
-        return f"{self.file.stem}{SEPARATOR}{self.number}" if self.number else self.file.stem
+        return f"{self.file.stem}{SEPARATOR}{self.change}" if self.change else self.file.stem
 
 
 def _capture_item(
-    item: _Item, *, root: Path, options: CaptureOptions, up: str | None, facing: str | None, seed: int
+    item: _Item,
+    *,
+    root: Path,
+    options: CaptureOptions,
+    donors: Sequence[Path],
+    up: str | None,
+    facing: str | None,
+    seed: int,
 ) -> str | None:
-    """Capture a file or a variant of it; the message of what is wrong with it, or None."""
+    """Capture a file or what is made of it and of donors; the message of what is wrong with it, or None."""
     try:
         surface = surface_of_scene(load_scene(item.file, up, facing))
-        if item.number:
-            drawn_from = (seed, zlib.crc32(item.file.stem.encode()), item.number)
-            surface = variant(surface, np.random.default_rng(drawn_from))
+        if item.change:
+            number = int(item.change.removeprefix(_SWAPPED))
+            drawn_from = [seed, zlib.crc32(item.file.stem.encode()), number]
+            if item.change.startswith(_SWAPPED):
+                rng = np.random.default_rng([*drawn_from, 1])
+                others = [donors[index] for index in rng.integers(len(donors), size=2)]
+                parts = [surface_of_scene(load_scene(other, up, facing)) for other in others]
+                surface = swap_parts([surface, *parts], rng)
+            else:
+                surface = variant(surface, np.random.default_rng(drawn_from))
         capture_scene_to(root, item.name, surface, options)
     except CharNeRFError as err:
         return str(err)

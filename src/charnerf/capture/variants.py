@@ -30,7 +30,7 @@ def variant(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
     Returns:
         Same triangles, moved: 2 m tall, feet on z = 0, middle of its box on the z axis.
     """
-    triangles = _stand(_bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3))
+    triangles = stand(_bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3))
     reach = np.abs(triangles).max(axis=(0, 1))[:2]
     allowed = np.maximum(REACH, np.abs(surface.triangles).max(axis=(0, 1))[:2])
     triangles[..., :2] *= np.minimum(1.0, allowed / np.maximum(reach, 1e-9))
@@ -71,7 +71,8 @@ def _profile(rng: np.random.Generator, *, spread: float, common: float) -> Pchip
     )
 
 
-def _stand(triangles: np.ndarray) -> np.ndarray:
+def stand(triangles: np.ndarray) -> np.ndarray:
+    """Triangles (M, 3, 3) brought to 2 m, feet on z = 0, middle of their box on the z axis."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     middle = np.array(((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]))
     return (triangles - middle) * (HEIGHT / max(float(high[2] - low[2]), 1e-9))

@@ -1,4 +1,4 @@
-"""More characters from the ones there are: other proportions and other colours, the drawings and the rays changed alike.
+"""More characters from the ones there are: other proportions, colours, left and right, the drawings and the rays changed alike.
 
 An affine map of the world takes rays to rays, so that the captured pictures stay true of the stretched character; orthographic
 drawings seen along an axis only change their width. Or the drawings become drawn ones, and the rays stay true.
@@ -14,6 +14,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from charnerf.data.drawing_style import draw_pictures, random_style
+from charnerf.geometry.cameras import mirror_cameras
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, TrainBatch
 
 ALIGNED = 0.999  # |cosine| of a viewing axis and a world axis
@@ -44,6 +45,7 @@ class StretchAndRecolor(AbstractAugmentation):
         stretch_share: Share of the steps whose characters are stretched in width and depth.
         width_range: Factors on the width, smallest and largest; above 1.05 arms may leave the drawing's frame.
         depth_range: Factors on the depth.
+        mirror_share: Share of the steps whose characters change left and right.
         recolor_share: Share of the steps whose colour channels are permuted.
         used_views: The model's rule from drawings to views; a hull has maps for all of those.
     """
@@ -54,6 +56,7 @@ class StretchAndRecolor(AbstractAugmentation):
         stretch_share: float,
         width_range: list[float],
         depth_range: list[float],
+        mirror_share: float,
         recolor_share: float,
         used_views: Callable[[SourceViews], SourceViews],
     ) -> None:
@@ -61,11 +64,12 @@ class StretchAndRecolor(AbstractAugmentation):
         self.stretch_share = stretch_share
         self.width_range = width_range
         self.depth_range = depth_range
+        self.mirror_share = mirror_share
         self.recolor_share = recolor_share
 
     def __call__(self, batch: TrainBatch, generator: torch.Generator) -> TrainBatch:
         """Return the batch changed at random."""
-        draws = torch.rand(4, generator=generator)
+        draws = torch.rand(5, generator=generator)
         if draws[0] < self.stretch_share and can_stretch(batch.views):
             scales = torch.stack(
                 (_between(self.width_range, draws[1]), _between(self.depth_range, draws[2]), torch.ones(()))
@@ -73,7 +77,7 @@ class StretchAndRecolor(AbstractAugmentation):
             batch = stretch(batch, scales, self.used_views(batch.views).cameras)
         if draws[3] < self.recolor_share:
             batch = recolor(batch, torch.randperm(3, generator=generator))
-        return batch
+        return mirror(batch) if draws[4] < self.mirror_share else batch
 
 
 @final
@@ -113,6 +117,7 @@ class StretchRecolorAndDraw(AbstractAugmentation):
         stretch_share: See StretchAndRecolor, as the next three.
         width_range: Factors on the width.
         depth_range: Factors on the depth.
+        mirror_share: Share of the steps whose characters change left and right.
         recolor_share: Share of the steps whose colour channels are permuted.
         drawing_share: See DrawnSources, as the next three.
         wobble: Of the hand, as a share of the side.
@@ -127,6 +132,7 @@ class StretchRecolorAndDraw(AbstractAugmentation):
         stretch_share: float,
         width_range: list[float],
         depth_range: list[float],
+        mirror_share: float,
         recolor_share: float,
         drawing_share: float,
         wobble: float,
@@ -138,6 +144,7 @@ class StretchRecolorAndDraw(AbstractAugmentation):
             stretch_share=stretch_share,
             width_range=width_range,
             depth_range=depth_range,
+            mirror_share=mirror_share,
             recolor_share=recolor_share,
             used_views=used_views,
         )
@@ -229,6 +236,38 @@ def _widen(maps: Tensor, factors: Tensor, cameras: Cameras, *, padding: str) -> 
     )
     widened = F.grid_sample(maps.flatten(0, 1), grid.flatten(0, 1), padding_mode=padding, align_corners=False)
     return widened.unflatten(0, (batch, views))
+
+
+def mirror(batch: TrainBatch) -> TrainBatch:
+    """The batch of the characters mirrored in the plane x = 0: drawings, hulls, rays and points alike."""
+    flip = batch.rays.origins.new_tensor((-1.0, 1.0, 1.0))
+    points, space = batch.surface, batch.space
+    return replace(
+        batch,
+        views=mirror_views(batch.views),
+        hull=None if batch.hull is None else _mirror_hull(batch.hull),
+        rays=RayBundle(origins=batch.rays.origins * flip, directions=batch.rays.directions * flip),
+        surface=None if points is None else replace(points, points=points.points * flip),
+        space=None if space is None else replace(space, points=space.points * flip),
+    )
+
+
+def mirror_views(views: SourceViews) -> SourceViews:
+    """Drawings of the mirrored character: a view from its left becomes one from its right."""
+    return replace(views, images=views.images.flip(-1), cameras=mirror_cameras(views.cameras))
+
+
+def _mirror_hull(hull: Hull) -> Hull:
+    low, high = hull.box_min.clone(), hull.box_max.clone()
+    low[:, 0], high[:, 0] = -hull.box_max[:, 0], -hull.box_min[:, 0]
+    return replace(
+        hull,
+        occupancy=hull.occupancy.flip(1),
+        box_min=low,
+        box_max=high,
+        front_depths=hull.front_depths.flip(-1),
+        edge_distances=hull.edge_distances.flip(-1),
+    )
 
 
 def recolor(batch: TrainBatch, order: Tensor) -> TrainBatch:

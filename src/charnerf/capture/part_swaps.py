@@ -1,0 +1,181 @@
+"""Other characters out of several: the head of one, the body of another, the legs of a third.
+
+Each is bent into other proportions first (capture/variants.py), then cut across at the neck and at the hips, where its
+own outline shows them. What a network learns of one part can then not be told from another part of the character.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from charnerf.capture.meshes import HEIGHT
+from charnerf.capture.variants import stand, variant
+from charnerf.data.surface_mesh import SurfaceMesh, triangle_areas
+from charnerf.errors import DataError
+
+_ROWS, _COLUMNS = 80, 80  # of the outline
+_REACH = 1.6  # m: the outline's half width
+_NECK = (0.45, 0.92)  # shares of the height between which a neck is looked for
+_HIPS = (0.12, 0.5)
+_FIT = (0.6, 1.7)  # smallest and largest factor that fits a part's width to the body's
+
+
+def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> SurfaceMesh:
+    """One character with the body of the first, the head of the second and the legs of the third.
+
+    Args:
+        characters: Three, world frame, 2 m tall; the same one may stand in several places.
+        rng: What proportions are drawn from.
+
+    Returns:
+        2 m tall, feet on z = 0, middle of its box on the z axis.
+
+    Raises:
+        DataError: If one of the parts has no surface.
+    """
+    body, head, legs = (_Figure(variant(one, rng)) for one in characters)
+    parts = {
+        "body": slab(body.surface, body.hips, body.neck),
+        "head": _fitted(
+            slab(head.surface, head.neck, np.inf), head.widths(head.neck), body.widths(body.neck), head.neck
+        ),
+        "legs": _fitted(
+            slab(legs.surface, -np.inf, legs.hips), legs.widths(legs.hips), body.widths(body.hips), legs.hips
+        ),
+    }
+    missing = [name for name, part in parts.items() if not len(part.triangles)]
+    if missing:
+        raise DataError(
+            f"swap of parts: nothing of the character is its {missing[0]}; leave it out of the swaps."
+        )
+    raised = _placed(parts["head"], 1.0, body.neck - head.neck)
+    lengthened = _placed(parts["legs"], body.hips / legs.hips, 0.0)
+    joined = _joined([parts["body"], raised, lengthened])
+    return replace(joined, triangles=stand(joined.triangles.astype(np.float64)).astype(np.float32))
+
+
+def heights_of_cuts(surface: SurfaceMesh) -> tuple[float, float]:
+    """Heights of a character's neck and hips, m, as its outline from the front shows them.
+
+    The neck is the narrowest row above the widest one (arms held out make the shoulders the widest), the hips the highest gap
+    between the legs, or a third of the height where there is none.
+    """
+    figure = _Figure(surface)
+    return figure.neck, figure.hips
+
+
+class _Figure:
+    """A surface and where its outline would be cut."""
+
+    def __init__(self, surface: SurfaceMesh) -> None:
+        self.surface = surface
+        self.runs = _middle_runs(surface)  # cells
+        low, high = (round(share * _ROWS) for share in _NECK)
+        widest = low + int(np.argmax(self.runs[low:high]))
+        rows = self.runs[widest:high]
+        self.neck = _height_of_row(widest + int(np.argmin(np.where(rows > 0, rows, _COLUMNS))))
+        low, high = (round(share * _ROWS) for share in _HIPS)
+        gap = np.flatnonzero(self.runs[low:high] == 0)
+        self.hips = _height_of_row(low + int(gap.max()) + 1 if len(gap) else round(_ROWS / 3))
+
+    def widths(self, height: float) -> np.ndarray:
+        """Extent in x and y near a height, arms left out, m, (2,)."""
+        corners = self.surface.triangles.reshape(-1, 3)
+        run = max(1, self.runs[min(int(height / HEIGHT * _ROWS), _ROWS - 1)]) * _REACH / _COLUMNS
+        near = corners[(np.abs(corners[:, 2] - height) < 0.12) & (np.abs(corners[:, 0]) < 1.2 * run)]
+        depth = np.ptp(near[:, 1]) if len(near) > 3 else 0.2
+        return np.maximum(np.array((2.0 * run, depth)), 0.05)
+
+
+def _height_of_row(row: int) -> float:
+    return (row + 0.5) * HEIGHT / _ROWS
+
+
+def _middle_runs(surface: SurfaceMesh) -> np.ndarray:
+    """Cells of each row of the front view that hang together with the middle, feet first, (_ROWS,); 0 where it is empty."""
+    rng = np.random.default_rng(0)
+    areas = triangle_areas(surface)
+    chosen = rng.choice(len(areas), 40000, p=areas / areas.sum())
+    u, v = rng.random((2, len(chosen), 1))
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    corner, second, third = np.moveaxis(surface.triangles[chosen].astype(np.float64), 1, 0)
+    x, _, z = (corner + u * (second - corner) + v * (third - corner)).T
+    counts, _, _ = np.histogram2d(z, x, (_ROWS, _COLUMNS), ((0.0, HEIGHT), (-_REACH, _REACH)))
+    covered, middle = counts > 0, _COLUMNS // 2
+    right = np.cumprod(covered[:, middle:], axis=1).sum(axis=1)
+    left = np.cumprod(covered[:, middle - 1 :: -1], axis=1).sum(axis=1)
+    return left + right
+
+
+def _fitted(part: SurfaceMesh, widths: np.ndarray, wanted: np.ndarray, height: float) -> SurfaceMesh:
+    """A part scaled about a height, by the mean of what both widths ask for (heads are round)."""
+    low, high = _FIT
+    factor = np.clip(np.sqrt(np.prod(wanted / widths)), low, high)
+    about = np.array((0.0, 0.0, height), np.float32)
+    return replace(part, triangles=(part.triangles - about) * np.float32(factor) + about)
+
+
+def _placed(part: SurfaceMesh, factor: float, offset: float) -> SurfaceMesh:
+    """A part with its heights scaled, then raised."""
+    factors, offsets = np.array((1.0, 1.0, factor), np.float32), np.array((0.0, 0.0, offset), np.float32)
+    return replace(part, triangles=part.triangles * factors + offsets)
+
+
+def slab(surface: SurfaceMesh, low: float, high: float) -> SurfaceMesh:
+    """What of a surface lies between two heights, m; triangles across them are cut."""
+    corners = np.concatenate((surface.triangles, surface.uvs, surface.colors), axis=-1)
+    ids = surface.material_ids
+    if np.isfinite(low):
+        corners, ids = _above(corners, ids, low, 1.0)
+    if np.isfinite(high):
+        corners, ids = _above(corners, ids, high, -1.0)
+    order = np.argsort(ids, kind="stable")
+    corners = corners[order].astype(np.float32)
+    return replace(
+        surface,
+        triangles=corners[..., :3],
+        uvs=corners[..., 3:5],
+        colors=corners[..., 5:],
+        material_ids=ids[order],
+    )
+
+
+def _above(corners: np.ndarray, ids: np.ndarray, height: float, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    """The side of triangles (M, 3, C) above a height (sign 1) or below it (-1); C starts with the place."""
+    distance = sign * (corners[..., 2] - height)
+    inside = distance >= 0.0
+    count = inside.sum(axis=1)
+    kept, kept_ids = [corners[count == 3]], [ids[count == 3]]
+    for lonely, few in ((1, True), (2, False)):  # corners inside; the lonely one is turned to the front
+        crossing = count == lonely
+        turn = np.argmax(inside[crossing] == few, axis=1)
+        turned = (turn[:, None] + np.arange(3)) % 3
+        triangle = np.take_along_axis(corners[crossing], turned[..., None], axis=1)
+        to_plane = np.take_along_axis(distance[crossing], turned, axis=1)
+        share = to_plane[:, :1] / (to_plane[:, :1] - to_plane[:, 1:])
+        cut = triangle[:, :1] + share[..., None] * (triangle[:, 1:] - triangle[:, :1])
+        if few:
+            kept += [np.stack((triangle[:, 0], cut[:, 0], cut[:, 1]), axis=1)]
+            kept_ids += [ids[crossing]]
+        else:
+            kept += [
+                np.stack((cut[:, 0], triangle[:, 1], triangle[:, 2]), axis=1),
+                np.stack((cut[:, 0], triangle[:, 2], cut[:, 1]), axis=1),
+            ]
+            kept_ids += [ids[crossing]] * 2
+    return np.concatenate(kept), np.concatenate(kept_ids)
+
+
+def _joined(parts: Sequence[SurfaceMesh]) -> SurfaceMesh:
+    """Several surfaces as one."""
+    starts = np.cumsum([0, *(len(part.materials) for part in parts)])
+    return SurfaceMesh(
+        triangles=np.concatenate([part.triangles for part in parts]),
+        uvs=np.concatenate([part.uvs for part in parts]),
+        colors=np.concatenate([part.colors for part in parts]),
+        material_ids=np.concatenate(
+            [part.material_ids + np.int32(start) for part, start in zip(parts, starts, strict=False)]
+        ),
+        materials=tuple(material for part in parts for material in part.materials),
+    )
