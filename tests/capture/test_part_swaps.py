@@ -13,13 +13,13 @@ from charnerf.data.surface_mesh import SurfaceMesh, shade, triangle_areas
 from charnerf.errors import DataError
 
 
-def figure(color, *, neck=1.55, hips=0.8, fine=1):
+def figure(color, *, neck=1.55, hips=0.8, wide=1.8, fine=1):
     """Boxes: two legs, a body, arms held out, a thin neck, a head. 2 m."""
     boxes = [
         ((0.2, 0.3, hips), (-0.2, 0.0, hips / 2)),
         ((0.2, 0.3, hips), (0.2, 0.0, hips / 2)),
         ((0.7, 0.4, neck - 0.1 - hips), (0.0, 0.0, (neck - 0.1 + hips) / 2)),
-        ((1.8, 0.2, 0.2), (0.0, 0.0, neck - 0.2)),
+        ((wide, 0.2, 0.2), (0.0, 0.0, neck - 0.2)),
         ((0.15, 0.15, 0.2), (0.0, 0.0, neck)),
         ((0.5, 0.5, 1.9 - neck), (0.0, 0.0, (neck + 2.1) / 2)),
     ]
@@ -92,6 +92,16 @@ def test_each_part_comes_from_its_character(seed):
     assert all(len(part) for part in by_colour)
     for lower, upper in itertools.pairwise(by_colour):
         assert lower.max() <= upper.min() + 1e-3
+
+
+def test_no_swap_leaves_the_box():
+    """A short body with wide arms on short legs, under a flat head: brought to 2 m it would be 4 m wide."""
+    short = figure((9, 9, 9), neck=1.2, hips=0.3, wide=3.0)
+    flat = figure((9, 9, 9), neck=1.8, hips=0.3)
+    for seed in range(10):
+        made = swap_parts([short, flat, short], np.random.default_rng(seed))
+        assert np.abs(made.triangles[..., :2]).max() <= 1.5 + 1e-5
+        np.testing.assert_allclose(np.ptp(made.triangles[..., 2]), 2.0, atol=1e-5)
 
 
 def test_a_character_without_a_body_is_refused():

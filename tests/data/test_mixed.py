@@ -195,6 +195,17 @@ def test_the_store_drops_what_was_not_used_for_longest(figure_dataset):
     assert again is not first and torch.equal(again.images, first.images)
 
 
+def test_a_character_without_a_hull_is_named(figure_dataset):
+    """A training on hundreds says which of them stopped it."""
+
+    def refuse(views: SourceViews):
+        raise DataError("reaches the sides")
+
+    store = CharacterStore(root=figure_dataset, names=NAMES, carve=refuse, memory_mib=64.0)
+    with pytest.raises(DataError, match=r"lefty: reaches the sides"):
+        store.open("lefty")
+
+
 def test_validation_shows_each_characters_views(figure_dataset):
     views = ValidationDataset(store=store_of(figure_dataset, names=("lefty", "rods")), views=5)
     assert len(views) == 10  # `rods` has three frames only: two of them are shown again

@@ -50,6 +50,19 @@ def test_colours_follow_the_finer_drawings_and_densities_do_not_change(model):
     assert contrast[2] > 10.0 * contrast[0] and contrast[1] < 0.5 * contrast[2]
 
 
+def test_some_points_are_coloured_as_they_are_among_all(model):
+    """Densities first, finer colours for every third point: the same numbers as all at once."""
+    points = points_of_stripes()
+    dirs = torch.tensor((0.0, 1.0, 0.0)).expand_as(points)
+    with torch.no_grad():
+        scene = model.scene(model.encode(striped(SMALL), detailed=striped(LARGE)), 0).at_width(LARGE)
+        at_once = scene.field(points, dirs)
+        answer = scene.densities_first(points, dirs)
+        some = answer.colours(answer.state[::3])
+    torch.testing.assert_close(answer.densities, at_once.densities)
+    torch.testing.assert_close(some, at_once.rgb[::3])
+
+
 def test_wider_than_the_drawings_is_as_wide_as_they_are(model):
     points = points_of_stripes()
     dirs = torch.tensor((0.0, 1.0, 0.0)).expand_as(points)

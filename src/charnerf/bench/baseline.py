@@ -25,6 +25,7 @@ from charnerf.models.charnerf import HULL_DEPTH_FADE, CharNeRF, EncodedViews
 from charnerf.models.features.base import ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
+from charnerf.models.view_maps import on_white
 from charnerf.types import FieldOutput, Hull, RayBundle, RenderOutput, SourceViews
 from charnerf.volume.compositing import composite, expected_depth, weights_from_densities
 
@@ -47,11 +48,10 @@ class PixelAligned:
     def of(cls, encoded: EncodedViews, index: int = 0) -> "PixelAligned":
         """One character of a batch of encoded views."""
         views = encoded.views[index]
-        rgb, alpha = views.images[:, :3], views.images[:, 3:]
         hull = None if encoded.hull is None else encoded.hull[index]
         maps = None if hull is None else torch.stack((hull.front_depths, hull.edge_distances), dim=1)
         sections = None if hull is None else cross_sections(hull)
-        return cls(views, encoded.feature_maps[index], rgb * alpha + (1.0 - alpha), hull, maps, sections)
+        return cls(views, encoded.feature_maps[index], on_white(views.images), hull, maps, sections)
 
 
 @final
@@ -139,6 +139,7 @@ class PixelNeRFLike:
                 latents=latents,
                 extras=network.features(readings),
                 source_rgb=source_rgb,
+                shares=(pixels / size).transpose(0, 1),
                 visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
                 valid=valid,
                 encoded_points=encoded,

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from charnerf.capture.meshes import HEIGHT
-from charnerf.capture.variants import stand, variant
+from charnerf.capture.variants import REACH, stand, variant
 from charnerf.data.surface_mesh import SurfaceMesh, triangle_areas
 from charnerf.errors import DataError
 
@@ -29,7 +29,7 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
         rng: What proportions are drawn from.
 
     Returns:
-        2 m tall, feet on z = 0, middle of its box on the z axis.
+        2 m tall, feet on z = 0, middle of its box on the z axis, reaching no farther than 1.5 m to a side.
 
     Raises:
         DataError: If one of the parts has no surface.
@@ -52,7 +52,8 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
     raised = _placed(parts["head"], 1.0, body.neck - head.neck)
     lengthened = _placed(parts["legs"], body.hips / legs.hips, 0.0)
     joined = _joined([parts["body"], raised, lengthened])
-    return replace(joined, triangles=stand(joined.triangles.astype(np.float64)).astype(np.float32))
+    standing = stand(joined.triangles.astype(np.float64), reach=np.array((REACH, REACH)))
+    return replace(joined, triangles=standing.astype(np.float32))
 
 
 def heights_of_cuts(surface: SurfaceMesh) -> tuple[float, float]:

@@ -30,10 +30,8 @@ def variant(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
     Returns:
         Same triangles, moved: 2 m tall, feet on z = 0, middle of its box on the z axis.
     """
-    triangles = stand(_bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3))
-    reach = np.abs(triangles).max(axis=(0, 1))[:2]
-    allowed = np.maximum(REACH, np.abs(surface.triangles).max(axis=(0, 1))[:2])
-    triangles[..., :2] *= np.minimum(1.0, allowed / np.maximum(reach, 1e-9))
+    bent = _bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3)
+    triangles = stand(bent, reach=np.maximum(REACH, np.abs(surface.triangles).max(axis=(0, 1))[:2]))
     corners = np.arange(3)
     if rng.random() < 0.5:
         triangles[..., 0] *= -1.0
@@ -71,8 +69,11 @@ def _profile(rng: np.random.Generator, *, spread: float, common: float) -> Pchip
     )
 
 
-def stand(triangles: np.ndarray) -> np.ndarray:
-    """Triangles (M, 3, 3) brought to 2 m, feet on z = 0, middle of their box on the z axis."""
+def stand(triangles: np.ndarray, *, reach: np.ndarray) -> np.ndarray:
+    """Triangles (M, 3, 3) brought to 2 m, feet on z = 0, middle of their box on the z axis, within a reach (x, y), m."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     middle = np.array(((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]))
-    return (triangles - middle) * (HEIGHT / max(float(high[2] - low[2]), 1e-9))
+    standing = (triangles - middle) * (HEIGHT / max(float(high[2] - low[2]), 1e-9))
+    reached = np.abs(standing).max(axis=(0, 1))[:2]
+    standing[..., :2] *= np.minimum(1.0, reach / np.maximum(reached, 1e-9))
+    return standing

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
+from charnerf.errors import DataError
 from charnerf.geometry.silhouettes import hull_silhouettes
 from charnerf.types import Hull, SourceViews
 
@@ -77,7 +78,10 @@ class CharacterStore:
             return found
         character = load_character(self.root, name)
         images = character.images(range(len(character.image_files)))
-        hull = self.carve(character.sources)
+        try:
+            hull = self.carve(character.sources)
+        except DataError as err:
+            raise DataError(f"{self.root / name}: {err}") from err
         shown = images[..., 3] > 0
         foreground = shown.reshape(-1).nonzero()[:, 0].to(torch.int32)
         near = ~shown if hull is None else hull_silhouettes(hull[0], character.cameras) & ~shown

@@ -16,7 +16,7 @@ from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import ViewMaps, on_white
+from charnerf.models.view_maps import Pictures, ViewMaps, on_white
 from charnerf.models.views.base import AbstractViews
 from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
 
@@ -151,28 +151,23 @@ class CharNeRF(nn.Module):
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
         latents = self.coarse.hoist(rows), None if self.fine is None else self.fine.hoist(rows)
-        answer = partial(self.point_inputs, mirrored=views.mirrored.to(maps.dtype))
+        answer = partial(
+            self.point_inputs,
+            maps=self.view_maps(views, hull, present, maps),
+            mirrored=views.mirrored.to(maps.dtype),
+        )
 
-        def field_of(
-            field: Field, inputs: Callable[[Tensor, Tensor], PointInputs]
-        ) -> tuple[FieldFunction, DensityFunction]:
-            return (
-                lambda points, view_dirs: field(inputs(points, view_dirs)),
-                lambda points, view_dirs: field.densities(inputs(points, view_dirs)),
-            )
-
-        def fields_of(seen: ViewMaps) -> dict[str, Any]:
-            """The scene's fields, looking at some maps."""
-            coarse, densities = field_of(self.coarse, partial(answer, maps=seen, latents=latents[0]))
+        def fields(finer: Pictures | None) -> dict[str, Any]:
+            """The scene's fields, their colours read from finer pictures where there are any."""
+            coarse, densities = _field_of(self.coarse, partial(answer, latents=latents[0]), finer)
             fine = None
             if self.fine is not None:
-                fine, densities = field_of(self.fine, partial(answer, maps=seen, latents=latents[1]))
+                fine, densities = _field_of(self.fine, partial(answer, latents=latents[1]), finer)
             return {"coarse": coarse, "fine": fine, "densities_first": densities}
 
-        seen = self.view_maps(views, hull, present, maps)
         box_min, box_max = self.box
         scene = Scene(
-            **fields_of(seen),
+            **fields(None),
             hull=hull,
             box_min=box_min,
             box_max=box_max,
@@ -182,11 +177,13 @@ class CharNeRF(nn.Module):
         )
         if encoded.detailed is None:
             return scene
-        detailed = encoded.detailed[index][present]
+        detailed, encoded_width = encoded.detailed[index][present], encoded.views.cameras.width
 
         @lru_cache(maxsize=1)
         def at_width(width: int) -> Scene:
-            return replace(scene, **fields_of(seen.with_finer(detailed, width)))
+            if width <= encoded_width:
+                return scene
+            return replace(scene, **fields(Pictures.of(detailed, width)))
 
         return replace(scene, at_width=at_width)
 
@@ -218,7 +215,8 @@ class CharNeRF(nn.Module):
         return PointInputs(
             latents=sight.latents,
             extras=self.features(readings),
-            source_rgb=sight.finer_rgb,
+            source_rgb=sight.rgb,
+            shares=sight.shares,
             visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
             valid=sight.valid,
             encoded_points=self.coarse.single_view.locate(
@@ -228,3 +226,17 @@ class CharNeRF(nn.Module):
             view_dirs=view_dirs,
             source_dirs=sight.source_dirs,
         )
+
+
+def _field_of(
+    field: Field, inputs: Callable[[Tensor, Tensor], PointInputs], finer: Pictures | None
+) -> tuple[FieldFunction, DensityFunction]:
+    """A field as functions of points and directions; finer pictures are read only where colours are asked for."""
+
+    def coloured(seen: PointInputs) -> PointInputs:
+        return seen if finer is None else replace(seen, source_rgb=finer.read(seen.shares))
+
+    return (
+        lambda points, view_dirs: field(coloured(inputs(points, view_dirs))),
+        lambda points, view_dirs: field.densities(inputs(points, view_dirs), coloured),
+    )

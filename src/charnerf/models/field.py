@@ -1,5 +1,6 @@
 """One radiance field: lookup -> f1 -> H -> f2 -> colour and density. Coarse and fine are two of these over one encoder."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -58,18 +59,25 @@ class Field(nn.Module):
         rgb = self.head(trunk.features, trunk.view_features, inputs)
         return FieldOutput(rgb=rgb, densities=self.activation(trunk.raw_densities))
 
-    def densities(self, inputs: PointInputs) -> DensityAnswer:
-        """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps."""
+    def densities(self, inputs: PointInputs, coloured: Callable[[PointInputs], PointInputs]) -> DensityAnswer:
+        """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps.
+
+        Args:
+            inputs: Points as the views see them.
+            coloured: What the head sees of points whose colours are asked for, from what the trunk saw.
+        """
         trunk = self.density.trunk(inputs, self.single_view, self.combinator, self.multi_view)
         # what only the trunk reads need not be kept
         seen = replace(inputs, latents=inputs.latents[..., :0], extras=inputs.extras[..., :0])
         return DensityAnswer(
-            densities=self.activation(trunk.raw_densities), state=_Half(trunk, seen), colours=self._colours
+            densities=self.activation(trunk.raw_densities),
+            state=_Half(trunk, seen),
+            colours=lambda half: self._colours(half.trunk, coloured(half.inputs)),
         )
 
-    def _colours(self, half: "_Half") -> Tensor:
-        features = self.density.directed(half.trunk, half.inputs, self.combinator)
-        return self.head(features, half.trunk.view_features, half.inputs)
+    def _colours(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
+        features = self.density.directed(trunk, inputs, self.combinator)
+        return self.head(features, trunk.view_features, inputs)
 
     def hoist(self, rows: Tensor) -> Tensor:
         """Apply the linear layer of the features to the maps' rows (N, F) -> (N, D), once instead of at every point.

@@ -5,7 +5,7 @@ drawings on white, maps of
 the hull) is computed here once a character instead of once a sample.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -23,8 +23,8 @@ class Sight:
 
     Attributes:
         latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
-        rgb: (P, V, 3), colour of the drawings as they were encoded.
-        finer_rgb: (P, V, 3), colour of the drawings with as many pixels as are to be had.
+        rgb: (P, V, 3), colour of the drawings.
+        shares: (P, V, 2), where they project, in shares of the pictures' sides.
         front: (P, V), m, distance of the hull's front along the view's ray.
         edge: (P, V), pixels, distance from the mask's edge.
         along_ray: (P, V), m, distance of the point along the view's ray.
@@ -34,7 +34,7 @@ class Sight:
 
     latents: Tensor
     rgb: Tensor
-    finer_rgb: Tensor
+    shares: Tensor
     front: Tensor | None
     edge: Tensor | None
     along_ray: Tensor
@@ -52,8 +52,6 @@ class ViewMaps:
         map_size: Width and height of the feature maps.
         pictures: Rows (V * H * W, 3), or (V * H * W, 5) where the hull's maps have the pictures' size and
             lie beside the colours.
-        finer: Rows (V * H' * W', 3) of the same pictures with more pixels, None where there are none.
-        finer_size: Width and height of those.
         hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
             without a hull or where
             they lie beside the colours.
@@ -65,8 +63,6 @@ class ViewMaps:
     parallel: bool
     map_size: tuple[int, int]
     pictures: Tensor
-    finer: Tensor | None
-    finer_size: tuple[int, int]
     hull_rows: Tensor | None
     hull_size: tuple[int, int]
     sections: CrossSections | None
@@ -103,25 +99,10 @@ class ViewMaps:
             parallel=bool(views.cameras.orthographic.all()),
             map_size=map_size,
             pictures=maps_to_rows(pictures),
-            finer=None,
-            finer_size=(0, 0),
             hull_rows=rows,
             hull_size=size,
             sections=cross_sections(hull) if sections and hull is not None else None,
         )
-
-    def with_finer(self, pictures: Tensor, width: int) -> "ViewMaps":
-        """The same maps with their colours read from pictures (V, 3, H', W') on white.
-
-        They are shrunk to a width where they are wider; where it is no more than that of the pictures here, those stay.
-        """
-        tall, wide = pictures.shape[-2:]
-        if width <= self.cameras.width:
-            return self
-        if width < wide:
-            pictures = resized_pictures(pictures, width, round(width * tall / wide))
-        size = (pictures.shape[-1], pictures.shape[-2])
-        return replace(self, finer=maps_to_rows(pictures), finer_size=size)
 
     def look(self, points: Tensor, latents: Tensor) -> Sight:
         """Read features (rows (V * h * w, D)), drawings and hull maps at points (P, 3)."""
@@ -141,7 +122,7 @@ class ViewMaps:
         return Sight(
             latents=read.unflatten(0, leading),
             rgb=seen[..., :3],
-            finer_rgb=self._finer(shares, seen),
+            shares=shares,
             front=front,
             edge=edge,
             along_ray=along_ray,
@@ -155,14 +136,6 @@ class ViewMaps:
             nothing = torch.zeros_like(points)
             return nothing, nothing
         return read_cross_sections(self.sections, points)
-
-    def _finer(self, shares: Tensor, seen: Tensor) -> Tensor:
-        """Colours (P, V, 3) at places in the pictures, shares of their sides (P, V, 2)."""
-        if self.finer is None:
-            return seen[..., :3]
-        width, height = self.finer_size
-        own = bilinear_rows(shares * shares.new_tensor(self.finer_size), width=width, height=height)
-        return read_rows(self.finer, *own).unflatten(0, seen.shape[:2])
 
     def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
@@ -184,6 +157,33 @@ class ViewMaps:
         distance = (points[:, None] - centres).norm(dim=-1)
         along = torch.where(self.cameras.orthographic, depth, distance)
         return directions_to_points(self.cameras, points), along
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Drawings of one character on white as rows, for colours at their own resolution.
+
+    Attributes:
+        rows: (V * H * W, 3).
+        size: W and H.
+    """
+
+    rows: Tensor
+    size: tuple[int, int]
+
+    @classmethod
+    def of(cls, pictures: Tensor, width: int) -> "Pictures":
+        """Pictures (V, 3, H, W), shrunk to a width where they are wider."""
+        tall, wide = pictures.shape[-2:]
+        if width < wide:
+            pictures = resized_pictures(pictures, width, round(width * tall / wide))
+        return cls(maps_to_rows(pictures), (pictures.shape[-1], pictures.shape[-2]))
+
+    def read(self, shares: Tensor) -> Tensor:
+        """Colours (P, V, 3) at places (P, V, 2), shares of the sides."""
+        width, height = self.size
+        own = bilinear_rows(shares * shares.new_tensor(self.size), width=width, height=height)
+        return read_rows(self.rows, *own).unflatten(0, shares.shape[:2])
 
 
 def on_white(images: Tensor) -> Tensor:
