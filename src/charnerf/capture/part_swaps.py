@@ -1,7 +1,8 @@
 """Other characters out of several: the head of one, the body of another, the legs of a third.
 
 Each is bent into other proportions first (capture/variants.py), then cut across at the neck and at the hips, where its
-own outline shows them. What a network learns of one part can then not be told from another part of the character.
+own outline shows them; most of what is joined lowers its arms. What a network learns of one part can then not be told
+from another part of the character.
 """
 
 from collections.abc import Sequence
@@ -9,14 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from charnerf.capture.meshes import HEIGHT
-from charnerf.capture.variants import REACH, stand, variant
-from charnerf.data.surface_mesh import SurfaceMesh, triangle_areas
+from charnerf.capture.arms import find_arms
+from charnerf.capture.outline import CELL_WIDTH, COLUMNS, ROW_HEIGHT, ROWS, middle_runs
+from charnerf.capture.variants import REACH, bent, posed, stand
+from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import DataError
 
-_ROWS, _COLUMNS = 80, 80  # of the outline
-_REACH = 1.6  # m: the outline's half width
-_NECK = (0.45, 0.92)  # shares of the height between which a neck is looked for
+_SHOULDERS = (
+    0.35,
+    0.7,
+)  # shares of the height between which the widest row is taken for them, where no arms are held out
+_NECK = 0.08  # share of the height above them within which a neck is looked for
 _HIPS = (0.12, 0.5)
 _FIT = (0.6, 1.7)  # smallest and largest factor that fits a part's width to the body's
 
@@ -34,7 +38,7 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
     Raises:
         DataError: If one of the parts has no surface.
     """
-    body, head, legs = (_Figure(variant(one, rng)) for one in characters)
+    body, head, legs = (_Figure(bent(one, rng)) for one in characters)
     parts = {
         "body": slab(body.surface, body.hips, body.neck),
         "head": _fitted(
@@ -52,15 +56,19 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
     raised = _placed(parts["head"], 1.0, body.neck - head.neck)
     lengthened = _placed(parts["legs"], body.hips / legs.hips, 0.0)
     joined = _joined([parts["body"], raised, lengthened])
-    standing = stand(joined.triangles.astype(np.float64), reach=np.array((REACH, REACH)))
-    return replace(joined, triangles=standing.astype(np.float32))
+    return _standing(posed(_standing(joined), rng))
+
+
+def _standing(surface: SurfaceMesh) -> SurfaceMesh:
+    triangles = stand(surface.triangles.astype(np.float64), reach=np.array((REACH, REACH)))
+    return replace(surface, triangles=triangles.astype(np.float32))
 
 
 def heights_of_cuts(surface: SurfaceMesh) -> tuple[float, float]:
     """Heights of a character's neck and hips, m, as its outline from the front shows them.
 
-    The neck is the narrowest row above the widest one (arms held out make the shoulders the widest), the hips the highest gap
-    between the legs, or a third of the height where there is none.
+    The neck is the narrowest row above the arms, or above the widest row where they hang; the hips are the highest gap between
+    the legs, or a third of the height where there is none.
     """
     figure = _Figure(surface)
     return figure.neck, figure.hips
@@ -71,42 +79,27 @@ class _Figure:
 
     def __init__(self, surface: SurfaceMesh) -> None:
         self.surface = surface
-        self.runs = _middle_runs(surface)  # cells
-        low, high = (round(share * _ROWS) for share in _NECK)
-        widest = low + int(np.argmax(self.runs[low:high]))
-        rows = self.runs[widest:high]
-        self.neck = _height_of_row(widest + int(np.argmin(np.where(rows > 0, rows, _COLUMNS))))
-        low, high = (round(share * _ROWS) for share in _HIPS)
+        self.runs = middle_runs(surface)  # cells
+        arms = find_arms(surface, self.runs)
+        low, high = (round(share * ROWS) for share in _SHOULDERS)
+        shoulders = low + int(np.argmax(self.runs[low:high])) if arms is None else int(arms.high / ROW_HEIGHT)
+        above = self.runs[shoulders : shoulders + round(_NECK * ROWS)]
+        self.neck = _height_of_row(shoulders + int(np.argmin(np.where(above > 0, above, COLUMNS))))
+        low, high = (round(share * ROWS) for share in _HIPS)
         gap = np.flatnonzero(self.runs[low:high] == 0)
-        self.hips = _height_of_row(low + int(gap.max()) + 1 if len(gap) else round(_ROWS / 3))
+        self.hips = _height_of_row(low + int(gap.max()) + 1 if len(gap) else round(ROWS / 3))
 
     def widths(self, height: float) -> np.ndarray:
         """Extent in x and y near a height, arms left out, m, (2,)."""
         corners = self.surface.triangles.reshape(-1, 3)
-        run = max(1, self.runs[min(int(height / HEIGHT * _ROWS), _ROWS - 1)]) * _REACH / _COLUMNS
+        run = max(1, self.runs[min(int(height / ROW_HEIGHT), ROWS - 1)]) * (0.5 * CELL_WIDTH)
         near = corners[(np.abs(corners[:, 2] - height) < 0.12) & (np.abs(corners[:, 0]) < 1.2 * run)]
         depth = np.ptp(near[:, 1]) if len(near) > 3 else 0.2
         return np.maximum(np.array((2.0 * run, depth)), 0.05)
 
 
 def _height_of_row(row: int) -> float:
-    return (row + 0.5) * HEIGHT / _ROWS
-
-
-def _middle_runs(surface: SurfaceMesh) -> np.ndarray:
-    """Cells of each row of the front view that hang together with the middle, feet first, (_ROWS,); 0 where it is empty."""
-    rng = np.random.default_rng(0)
-    areas = triangle_areas(surface)
-    chosen = rng.choice(len(areas), 40000, p=areas / areas.sum())
-    u, v = rng.random((2, len(chosen), 1))
-    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-    corner, second, third = np.moveaxis(surface.triangles[chosen].astype(np.float64), 1, 0)
-    x, _, z = (corner + u * (second - corner) + v * (third - corner)).T
-    counts, _, _ = np.histogram2d(z, x, (_ROWS, _COLUMNS), ((0.0, HEIGHT), (-_REACH, _REACH)))
-    covered, middle = counts > 0, _COLUMNS // 2
-    right = np.cumprod(covered[:, middle:], axis=1).sum(axis=1)
-    left = np.cumprod(covered[:, middle - 1 :: -1], axis=1).sum(axis=1)
-    return left + right
+    return (row + 0.5) * ROW_HEIGHT
 
 
 def _fitted(part: SurfaceMesh, widths: np.ndarray, wanted: np.ndarray, height: float) -> SurfaceMesh:

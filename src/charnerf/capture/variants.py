@@ -9,19 +9,20 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from charnerf.capture.arms import lower_arms
 from charnerf.capture.meshes import HEIGHT
 from charnerf.data.surface_mesh import SurfaceMesh
 
 SEPARATOR = "+"  # NAME+2 is the second variant of NAME
 REACH = 1.5  # m: width and depth that no variant goes beyond to a side, unless its character did
+_LOWERED_SHARE = 0.7  # of the variants
 _KNOTS = np.linspace(0.0, HEIGHT, 6)  # m: feet, knees, hips, chest, head, top
 
 
 def variant(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
-    """The same character in other proportions and a slightly other pose.
+    """The same character in other proportions and another pose.
 
-    Heights are moved along the body (long legs, large heads), width and depth are scaled by height, arms
-    raised or lowered, the body leant and twisted; every other variant is mirrored. Textures and colours stay.
+    Seven of ten lower their arms (capture/arms.py); all are bent as by `bent`.
 
     Args:
         surface: World frame, 2 m tall.
@@ -30,8 +31,30 @@ def variant(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
     Returns:
         Same triangles, moved: 2 m tall, feet on z = 0, middle of its box on the z axis.
     """
-    bent = _bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3)
-    triangles = stand(bent, reach=np.maximum(REACH, np.abs(surface.triangles).max(axis=(0, 1))[:2]))
+    return bent(posed(surface, rng), rng)
+
+
+def posed(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
+    """The character, with its arms lowered in seven of ten cases."""
+    lowered, drawn = lower_arms(surface, rng), rng.random() < _LOWERED_SHARE
+    return replace(surface, triangles=lowered.astype(np.float32)) if drawn else surface
+
+
+def bent(surface: SurfaceMesh, rng: np.random.Generator) -> SurfaceMesh:
+    """The character in other proportions.
+
+    Heights are moved along the body (long legs, large heads), width and depth are scaled by height, arms
+    raised or lowered a little, the body leant and twisted; every other one is mirrored. Textures and colours stay.
+
+    Args:
+        surface: World frame, feet on z = 0.
+        rng: What is drawn from.
+
+    Returns:
+        Same triangles, moved: 2 m tall, feet on z = 0, middle of its box on the z axis.
+    """
+    moved = _bend(surface.triangles.astype(np.float64).reshape(-1, 3), rng).reshape(-1, 3, 3)
+    triangles = stand(moved, reach=np.maximum(REACH, np.abs(surface.triangles).max(axis=(0, 1))[:2]))
     corners = np.arange(3)
     if rng.random() < 0.5:
         triangles[..., 0] *= -1.0
