@@ -9,7 +9,7 @@ import small_runs
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from charnerf.errors import ConfigError
+from charnerf.errors import ConfigError, DataError
 from charnerf.losses.total import TERMS
 from charnerf.runs import load, load_config
 from charnerf.training.clock import RunClock
@@ -86,6 +86,14 @@ def test_tensorboards_own_reader_finds_everything(run_folder):
     settings = events.summary_metadata["_hparams_/session_start_info"].plugin_data.content
     assert b"num_parameters" in settings and b"model.box_half_extent" in settings
     assert b"val/psnr_foreground" in events.summary_metadata["_hparams_/experiment"].plugin_data.content
+
+
+@pytest.mark.parametrize("split", ["train_splits=[train,more]", "val_split=more", "test_split=more"])
+def test_a_split_that_is_not_there_is_found_before_training(figure_dataset, tmp_path, split):
+    cfg = small_runs.smoke_config(figure_dataset, f"sampling.{split}")
+    with pytest.raises(DataError, match=r"split 'more' does not exist; its splits are: .*test \(1\)"):
+        run_training(cfg, tmp_path / "run")
+    assert not (tmp_path / "run" / "weights.safetensors").exists()
 
 
 def test_pictures_of_another_size_are_told_before_training(figure_dataset, tmp_path):

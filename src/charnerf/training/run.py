@@ -58,7 +58,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     save_config(folder, cfg)
     losses: WeightedLosses = build_part(cfg.loss)
     root = build_part(cfg.data).prepare(depth=reads(cfg, losses, "depth"))
-    check_picture_size(root, cfg.sampling.train_splits[0], cfg.scale.image_size)
+    check_data(root, cfg.sampling, cfg.scale.image_size)
     model = build_model(cfg)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
@@ -93,18 +93,28 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
 
 
-def check_picture_size(root: Path, split: str, size: int) -> None:
-    """Check that the encoder is trained on drawings of the size that `charnerf reconstruct` will give it.
+def check_data(root: Path, sampling: DictConfig, size: int) -> None:
+    """Check what would end a run late, or make its weights useless.
+
+    Args:
+        root: Data set.
+        sampling: The config's.
+        size: Width of the drawings that `charnerf reconstruct` will give the encoder, pixels.
 
     Raises:
+        DataError: If a split that the run will read has no characters; the last is read after training.
         ConfigError: If the first character's drawings have another size.
     """
-    name = names_of(read_dataset(root), split)[0]
-    cameras = load_character(root, name).sources.cameras
+    info = read_dataset(root)
+    first, *_ = [
+        names_of(info, split)[0]
+        for split in (*sampling.train_splits, sampling.val_split, sampling.test_split)
+    ]
+    cameras = load_character(root, first).sources.cameras
     found = max(cameras.width, cameras.height)
     if found != size:
         raise ConfigError(
-            f"scale.image_size: found {size}, expected {found}, the size of the drawings of {root} ({name}: {cameras.width} x "
+            f"scale.image_size: found {size}, expected {found}, the size of the drawings of {root} ({first}: {cameras.width} x "
             f"{cameras.height} pixels). Set scale.image_size={found}, or capture with --size {size}."
         )
 
