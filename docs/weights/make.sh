@@ -9,9 +9,11 @@ folder="$1"
 shift
 data="$folder/characters"
 
-capture() { # split, folder of meshes, further options
+capture() { # split, folders of meshes separated by spaces, further options
   [ -e "$data/.$1" ] && return
-  charnerf capture "$folder/meshes/$2" -o "$data" --split "$1" "${@:3}"
+  local folders=()
+  for name in $2; do folders+=("$folder/meshes/$name"); done
+  charnerf capture "${folders[@]}" -o "$data" --split "$1" "${@:3}"
   touch "$data/.$1"
 }
 if [ ! -e "$data/.embedded" ]; then
@@ -28,14 +30,14 @@ capture train train
 capture train_extra train_extra
 capture val val
 capture test test
-capture train_variants train --views 24 --variants 3
-capture train_extra_variants train_extra --views 24 --variants 3
+capture variants "train train_extra" --views 24 --variants 2
+capture swaps "train train_extra" --views 24 --swaps 3
 
 run="$folder/run"
 resume=()
 [ -e "$run/checkpoints/last.ckpt" ] && resume=("ckpt_path=$run/checkpoints/last.ckpt")
 python train.py data=folder "data.root=$data" \
-  'sampling.train_splits=[train,train_extra,train,train_extra,train_variants,train_extra_variants,embedded]' \
+  'sampling.train_splits=[train,train_extra,train,train_extra,variants,swaps,embedded]' \
   features=image_hull_section encoder.coarse_width=64 encoder.coarse_channels=64 augmentation=stretch_recolor \
   augmentation.recolor_share=0.7 augmentation.stretch_share=0.8 averaging.decay=0.998 sampling.foreground_share=0.65 \
   budget.seconds=7200 sampling.memory_mib=10000 \

@@ -85,10 +85,10 @@ def find_arms(surface: SurfaceMesh, runs: np.ndarray) -> Arms | None:
 def _turned(
     first: np.ndarray, second: np.ndarray, about: tuple[float, float], angles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates turned about a place, by angles from the first axis towards the second."""
     a, b = first - about[0], second - about[1]
-    return about[0] + np.cos(angles) * a - np.sin(angles) * b, about[1] + np.sin(angles) * a + np.cos(
-        angles
-    ) * b
+    cos, sin = np.cos(angles), np.sin(angles)
+    return about[0] + cos * a - sin * b, about[1] + sin * a + cos * b
 
 
 def _rise(values: np.ndarray, start: float, end: float) -> np.ndarray:

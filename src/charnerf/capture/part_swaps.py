@@ -16,11 +16,10 @@ from charnerf.capture.variants import REACH, bent, posed, stand
 from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import DataError
 
-_SHOULDERS = (
-    0.35,
-    0.7,
-)  # shares of the height between which the widest row is taken for them, where no arms are held out
-_NECK = 0.08  # share of the height above them within which a neck is looked for
+# Shares of the height: where the widest row is taken for the shoulders if no arms are held out; how far above them a neck is looked
+# for; where a gap between the legs is.
+_SHOULDERS = (0.35, 0.7)
+_NECK = 0.08
 _HIPS = (0.12, 0.5)
 _FIT = (0.6, 1.7)  # smallest and largest factor that fits a part's width to the body's
 
