@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import pytest
 import torch
 
-from charnerf.data.augmentation import StretchAndRecolor, mirror, recolor, stretch
+from charnerf.data.augmentation import MirrorAndRecolor, StretchAndRecolor, mirror, recolor, stretch
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import BatchRequest
 from charnerf.data.store import CharacterStore
@@ -121,5 +121,5 @@ def test_shares_of_nought_and_one_do_nothing_and_all(batch):
     ranges = {"width_range": [0.8, 1.0], "depth_range": [0.8, 1.2], "used_views": VIEWS}
     never = StretchAndRecolor(**shares, **ranges)(batch, torch.Generator().manual_seed(0))
     assert all(torch.equal(value, dict(tensors(batch))[name]) for name, value in tensors(never))
-    always = StretchAndRecolor(**shares | {"mirror_share": 1.0}, **ranges)(batch, torch.Generator())
+    always = MirrorAndRecolor(mirror_share=1.0, recolor_share=0.0)(batch, torch.Generator())
     torch.testing.assert_close(always.rays.origins, mirror(batch).rays.origins)

@@ -38,6 +38,27 @@ class NoAugmentation(AbstractAugmentation):
 
 
 @final
+class MirrorAndRecolor(AbstractAugmentation):
+    """Training characters with left and right or colour channels exchanged.
+
+    Args:
+        mirror_share: Share of the steps whose characters change left and right.
+        recolor_share: Share of the steps whose colour channels are permuted.
+    """
+
+    def __init__(self, *, mirror_share: float, recolor_share: float) -> None:
+        self.mirror_share = mirror_share
+        self.recolor_share = recolor_share
+
+    def __call__(self, batch: TrainBatch, generator: torch.Generator) -> TrainBatch:
+        """Return the batch changed at random."""
+        draws = torch.rand(2, generator=generator)
+        if draws[0] < self.recolor_share:
+            batch = recolor(batch, torch.randperm(3, generator=generator))
+        return mirror(batch) if draws[1] < self.mirror_share else batch
+
+
+@final
 class StretchAndRecolor(AbstractAugmentation):
     """Random proportions and colours of training characters.
 
@@ -45,8 +66,8 @@ class StretchAndRecolor(AbstractAugmentation):
         stretch_share: Share of the steps whose characters are stretched in width and depth.
         width_range: Factors on the width, smallest and largest; above 1.05 arms may leave the drawing's frame.
         depth_range: Factors on the depth.
-        mirror_share: Share of the steps whose characters change left and right.
-        recolor_share: Share of the steps whose colour channels are permuted.
+        mirror_share: See MirrorAndRecolor, as the next.
+        recolor_share: Of the steps.
         used_views: The model's rule from drawings to views; a hull has maps for all of those.
     """
 
@@ -64,20 +85,17 @@ class StretchAndRecolor(AbstractAugmentation):
         self.stretch_share = stretch_share
         self.width_range = width_range
         self.depth_range = depth_range
-        self.mirror_share = mirror_share
-        self.recolor_share = recolor_share
+        self.exchange = MirrorAndRecolor(mirror_share=mirror_share, recolor_share=recolor_share)
 
     def __call__(self, batch: TrainBatch, generator: torch.Generator) -> TrainBatch:
         """Return the batch changed at random."""
-        draws = torch.rand(5, generator=generator)
+        draws = torch.rand(3, generator=generator)
         if draws[0] < self.stretch_share and can_stretch(batch.views):
             scales = torch.stack(
                 (_between(self.width_range, draws[1]), _between(self.depth_range, draws[2]), torch.ones(()))
             )
             batch = stretch(batch, scales, self.used_views(batch.views).cameras)
-        if draws[3] < self.recolor_share:
-            batch = recolor(batch, torch.randperm(3, generator=generator))
-        return mirror(batch) if draws[4] < self.mirror_share else batch
+        return self.exchange(batch, generator)
 
 
 @final
