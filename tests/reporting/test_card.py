@@ -20,7 +20,7 @@ def material(tmp_path):
     hull = {**scores, "psnr": 17.25, "by_azimuth": bins}
     metrics = {
         **scores, "psnr": 23.456, "split": "test", "num_characters": 2, "num_views": 48, "by_azimuth": bins,
-        "per_character": {}, "seconds": {"encode": 0.5, "render_per_frame": 0.25, "mesh": None},
+        "per_character": {}, "data_root": "/home/somebody/characters", "seconds": {"encode": 0.5, "render_per_frame": 0.25, "mesh": None},
         "baselines": {"white": dict.fromkeys(METRIC_KEYS, None), "visual_hull": hull},
     }  # fmt: skip
     (tmp_path / "measured").mkdir()
@@ -48,6 +48,9 @@ def test_tables_curve_and_metrics_are_written_and_words_stay(material):
     )
     assert "2 characters of the test split, 24 views each" in text
     assert "| charnerf, PSNR | 20.0 | 21.0 |" in text
+    published = json.loads(files[-1].read_text())
+    assert published["data_root"] == "characters"  # no folder of somebody's machine
+    assert published["psnr"] == 23.456
     write_card(card, curves, measured)
     assert card.read_text() == text  # the same again
 

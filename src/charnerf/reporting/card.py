@@ -3,8 +3,8 @@
 The card is a Markdown file with the lines of BEGIN and END in it; what stands between them is written anew.
 """
 
+import json
 import re
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -45,12 +45,18 @@ def write_card(card: Path, curves: Sequence[Path], measured: Mapping[str, Path])
     for title, metrics in found.items():
         copy = card.parent / f"metrics_{_slug(title)}.json"
         if _metrics_file(measured[title]).resolve() != copy.resolve():
-            shutil.copyfile(_metrics_file(measured[title]), copy)
+            write_text_atomically(copy, json.dumps(_published(metrics), indent=1) + "\n")
         files.append(copy)
         lines += ["", *_tables(title, metrics, copy.name)]
     start, end = text.index(BEGIN), text.index(END)
     write_text_atomically(card, text[:start] + "\n".join([*lines, "", ""]) + text[end:])
     return files
+
+
+def _published(metrics: dict[str, Any]) -> dict[str, Any]:
+    """Metrics that name the data set but not the folder of somebody's machine that it lay in."""
+    root = metrics.get("data_root")
+    return metrics if root is None else {**metrics, "data_root": Path(root).name}
 
 
 def titled(texts: Sequence[str]) -> dict[str, Path]:
