@@ -20,7 +20,8 @@ def material(tmp_path):
     hull = {**scores, "psnr": 17.25, "by_azimuth": bins}
     metrics = {
         **scores, "psnr": 23.456, "split": "test", "num_characters": 2, "num_views": 48, "by_azimuth": bins,
-        "per_character": {}, "data_root": "/home/somebody/characters", "seconds": {"encode": 0.5, "render_per_frame": 0.25, "mesh": None},
+        "per_character": {}, "data_root": "/home/somebody/characters",
+        "seconds": {"encode": 0.5, "render_per_frame": 0.25, "mesh": None},
         "baselines": {"white": dict.fromkeys(METRIC_KEYS, None), "visual_hull": hull},
     }  # fmt: skip
     (tmp_path / "measured").mkdir()
