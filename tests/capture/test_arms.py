@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -5,6 +7,7 @@ import trimesh
 from charnerf.capture.arms import find_arms, lower_arms
 from charnerf.capture.outline import middle_runs
 from charnerf.data.scene_mesh import surface_of_scene
+from charnerf.errors import DataError
 
 TRUNK, SHOULDER, REACH = 0.3, 1.4, 1.2  # half width, height of the arms, m
 
@@ -37,6 +40,14 @@ def test_who_holds_no_arms_out_stays():
     surface, _ = t_pose(arms=False)
     assert find_arms(surface, middle_runs(surface)) is None
     np.testing.assert_array_equal(lower_arms(surface, np.random.default_rng(0)), surface.triangles)
+
+
+def test_a_surface_without_area_is_refused():
+    """One bad mesh of many is a message, not the end of a capture."""
+    surface, _ = t_pose()
+    line = replace(surface, triangles=surface.triangles * np.array((0.0, 0.0, 1.0), np.float32))
+    with pytest.raises(DataError, match="area of 0"):
+        lower_arms(line, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("seed", range(12))

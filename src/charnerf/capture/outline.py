@@ -3,7 +3,8 @@
 import numpy as np
 
 from charnerf.capture.meshes import HEIGHT
-from charnerf.data.surface_mesh import SurfaceMesh, triangle_areas
+from charnerf.data.surface_mesh import SurfaceMesh, interpolate, triangle_areas
+from charnerf.errors import DataError
 
 ROWS, COLUMNS = 80, 80
 REACH = 1.6  # m: half the width looked at
@@ -12,14 +13,19 @@ _POINTS = 40000
 
 
 def middle_runs(surface: SurfaceMesh) -> np.ndarray:
-    """Cells of each row of the front view that hang together with the middle, feet first, (ROWS,); 0 where it is empty."""
+    """Cells of each row of the front view that hang together with the middle, feet first, (ROWS,); 0 where it is empty.
+
+    Raises:
+        DataError: If the surface has no area.
+    """
     rng = np.random.default_rng(0)
     areas = triangle_areas(surface)
+    if not areas.sum() > 0.0:
+        raise DataError("mesh: found an area of 0 m^2, expected triangles with area; export it again.")
     chosen = rng.choice(len(areas), _POINTS, p=areas / areas.sum())
-    u, v = rng.random((2, len(chosen), 1))
+    u, v = rng.random((2, len(chosen)))
     u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-    corner, second, third = np.moveaxis(surface.triangles[chosen].astype(np.float64), 1, 0)
-    x, _, z = (corner + u * (second - corner) + v * (third - corner)).T
+    x, _, z = interpolate(surface.triangles[chosen].astype(np.float64), u, v).T
     counts, _, _ = np.histogram2d(z, x, (ROWS, COLUMNS), ((0.0, HEIGHT), (-REACH, REACH)))
     covered, middle = counts > 0, COLUMNS // 2
     right = np.cumprod(covered[:, middle:], axis=1).sum(axis=1)
