@@ -22,6 +22,7 @@ from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
+from charnerf.geometry.resizing import resized_cameras
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.lod import lod_table
 from charnerf.model_api import Model, TextureKind
@@ -388,10 +389,4 @@ def _checked_character(model: Model, data: Path | None, character: str | None) -
 def _small(camera: Cameras) -> Cameras:
     """The same view with few pixels."""
     factor = CHECKED_SIZE / max(camera.width, camera.height)
-    return replace(
-        camera,
-        focal=camera.focal * factor,
-        principal_point=camera.principal_point * factor,
-        width=round(camera.width * factor),
-        height=round(camera.height * factor),
-    )
+    return resized_cameras(camera, round(camera.width * factor), round(camera.height * factor))

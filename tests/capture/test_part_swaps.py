@@ -6,7 +6,7 @@ import trimesh
 
 from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
-from charnerf.capture.part_swaps import heights_of_cuts, slab, swap_parts
+from charnerf.capture.part_swaps import Figure, slab, swap_parts
 from charnerf.data.layout import read_dataset
 from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface_mesh import SurfaceMesh, shade, triangle_areas
@@ -38,9 +38,9 @@ def figure(color, *, neck=1.55, hips=0.8, wide=1.8, fine=1):
 
 @pytest.mark.parametrize(("neck", "hips"), [(1.5, 0.8), (1.7, 0.5), (1.2, 0.4)])
 def test_neck_and_hips_are_found_in_the_outline(neck, hips):
-    found_neck, found_hips = heights_of_cuts(figure((9, 9, 9), neck=neck, hips=hips))
-    assert found_neck == pytest.approx(neck, abs=0.13)
-    assert found_hips == pytest.approx(hips, abs=0.06)
+    found = Figure(figure((9, 9, 9), neck=neck, hips=hips))
+    assert found.neck == pytest.approx(neck, abs=0.13)
+    assert found.hips == pytest.approx(hips, abs=0.06)
 
 
 @pytest.mark.parametrize("height", [0.3, 0.777, 1.0, 1.6])

@@ -24,8 +24,6 @@ from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import CharNeRFError, DataError
 
-_SWAPPED = "s"
-
 
 @dataclass(frozen=True)
 class CaptureReport:
@@ -81,9 +79,11 @@ def capture_dataset(
     check_name("split", split)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
-    changes = [str(number) for number in range(1, variants + 1)]
-    changes += [f"{_SWAPPED}{number}" for number in range(1, swaps + 1)]
-    items = [_Item(file, change) for file in files for change in changes or [""]]
+    items = []
+    for file in files:
+        items += [_Item(file, number) for number in range(1, variants + 1)]
+        items += [_Item(file, number, swapped=True) for number in range(1, swaps + 1)]
+    items = items or [_Item(file) for file in files]
     refuse_taken_names(open_or_new(root), [item.name for item in items])
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
@@ -172,14 +172,16 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Item:
-    """A mesh file, as it is ("") or changed: "2" is its second variant, "s2" its second exchange of parts."""
+    """A mesh file, as it is (0), one of its variants, or one of its exchanges of parts."""
 
     file: Path
-    change: str
+    number: int = 0
+    swapped: bool = False
 
     @property
     def name(self) -> str:
-        return f"{self.file.stem}{SEPARATOR}{self.change}" if self.change else self.file.stem
+        kind = "s" if self.swapped else ""
+        return f"{self.file.stem}{SEPARATOR}{kind}{self.number}" if self.number else self.file.stem
 
 
 def _capture_item(
@@ -195,16 +197,14 @@ def _capture_item(
     """Capture a file or what is made of it and of donors; the message of what is wrong with it, or None."""
     try:
         surface = surface_of_scene(load_scene(item.file, up, facing))
-        if item.change:
-            number = int(item.change.removeprefix(_SWAPPED))
-            drawn_from = [seed, zlib.crc32(item.file.stem.encode()), number]
-            if item.change.startswith(_SWAPPED):
-                rng = np.random.default_rng([*drawn_from, 1])
-                others = [donors[index] for index in rng.integers(len(donors), size=2)]
-                parts = [surface_of_scene(load_scene(other, up, facing)) for other in others]
-                surface = swap_parts([surface, *parts], rng)
-            else:
-                surface = variant(surface, np.random.default_rng(drawn_from))
+        drawn_from = [seed, zlib.crc32(item.file.stem.encode()), item.number]
+        if item.swapped:
+            rng = np.random.default_rng([*drawn_from, 1])
+            others = [donors[index] for index in rng.integers(len(donors), size=2)]
+            parts = [surface_of_scene(load_scene(other, up, facing)) for other in others]
+            surface = swap_parts([surface, *parts], rng)
+        elif item.number:
+            surface = variant(surface, np.random.default_rng(drawn_from))
         capture_scene_to(root, item.name, surface, options)
     except CharNeRFError as err:
         return str(err)

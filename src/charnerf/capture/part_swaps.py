@@ -37,7 +37,7 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
     Raises:
         DataError: If one of the parts has no surface.
     """
-    body, head, legs = (_Figure(bent(one, rng)) for one in characters)
+    body, head, legs = (Figure(bent(one, rng)) for one in characters)
     parts = {
         "body": slab(body.surface, body.hips, body.neck),
         "head": _fitted(
@@ -63,22 +63,19 @@ def _standing(surface: SurfaceMesh) -> SurfaceMesh:
     return replace(surface, triangles=triangles.astype(np.float32))
 
 
-def heights_of_cuts(surface: SurfaceMesh) -> tuple[float, float]:
-    """Heights of a character's neck and hips, m, as its outline from the front shows them.
+class Figure:
+    """A surface and where its outline from the front would be cut.
 
-    The neck is the narrowest row above the arms, or above the widest row where they hang; the hips are the highest gap between
-    the legs, or a third of the height where there is none.
+    Attributes:
+        surface: World frame, 2 m tall.
+        runs: Its `middle_runs`.
+        neck: Height of the narrowest row above the arms, or above the widest row where they hang, m.
+        hips: Height of the highest gap between the legs, or a third of the height where there is none, m.
     """
-    figure = _Figure(surface)
-    return figure.neck, figure.hips
-
-
-class _Figure:
-    """A surface and where its outline would be cut."""
 
     def __init__(self, surface: SurfaceMesh) -> None:
         self.surface = surface
-        self.runs = middle_runs(surface)  # cells
+        self.runs = middle_runs(surface)
         arms = find_arms(surface, self.runs)
         low, high = (round(share * ROWS) for share in _SHOULDERS)
         shoulders = low + int(np.argmax(self.runs[low:high])) if arms is None else int(arms.high / ROW_HEIGHT)

@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from charnerf.data.drawing_style import draw_pictures, random_style
-from charnerf.geometry.cameras import mirror_cameras
+from charnerf.geometry.cameras import mirror_views
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, TrainBatch
 
 ALIGNED = 0.999  # |cosine| of a viewing axis and a world axis
@@ -268,11 +268,6 @@ def mirror(batch: TrainBatch) -> TrainBatch:
         surface=None if points is None else replace(points, points=points.points * flip),
         space=None if space is None else replace(space, points=space.points * flip),
     )
-
-
-def mirror_views(views: SourceViews) -> SourceViews:
-    """Drawings of the mirrored character: a view from its left becomes one from its right."""
-    return replace(views, images=views.images.flip(-1), cameras=mirror_cameras(views.cameras))
 
 
 def _mirror_hull(hull: Hull) -> Hull:

@@ -5,13 +5,14 @@ front (it faces -Y), 90 its left side, 180 its back; elevation 0 is level.
 """
 
 import math
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from charnerf.checks import check_last_dim
 from charnerf.geometry.safe import safe_normalize
-from charnerf.types import Cameras, RayBundle
+from charnerf.types import Cameras, RayBundle, SourceViews
 
 
 def fibonacci_hemisphere(num_points: int) -> Tensor:
@@ -135,6 +136,11 @@ def mirror_cameras(cameras: Cameras) -> Cameras:
         width=cameras.width,
         height=cameras.height,
     )
+
+
+def mirror_views(views: SourceViews) -> SourceViews:
+    """Views of the character mirrored in the plane x = 0: one from its left becomes one from its right."""
+    return replace(views, images=views.images.flip(-1), cameras=mirror_cameras(views.cameras))
 
 
 def to_camera_frame(cameras: Cameras, points: Tensor) -> Tensor:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any, final
+from typing import final
 
 import torch
 from torch import Tensor, nn
@@ -157,35 +157,37 @@ class CharNeRF(nn.Module):
             mirrored=views.mirrored.to(maps.dtype),
         )
 
-        def fields(finer: Pictures | None) -> dict[str, Any]:
-            """The scene's fields, their colours read from finer pictures where there are any."""
+        coarse_hull = None if hull is None else coarse_occupancy(hull.occupancy)
+        box_min, box_max = self.box
+
+        def scene_of(finer: Pictures | None, at_width: Callable[[int], Scene] | None) -> Scene:
+            """The scene, its colours read from finer pictures where there are any."""
             coarse, densities = _field_of(self.coarse, partial(answer, latents=latents[0]), finer)
             fine = None
             if self.fine is not None:
                 fine, densities = _field_of(self.fine, partial(answer, latents=latents[1]), finer)
-            return {"coarse": coarse, "fine": fine, "densities_first": densities}
+            return Scene(
+                coarse=coarse,
+                fine=fine,
+                hull=hull,
+                box_min=box_min,
+                box_max=box_max,
+                density_sees_directions=self.coarse.density.sees_directions,
+                densities_first=densities,
+                coarse_hull=coarse_hull,
+                bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
+                at_width=at_width,
+            )
 
-        box_min, box_max = self.box
-        scene = Scene(
-            **fields(None),
-            hull=hull,
-            box_min=box_min,
-            box_max=box_max,
-            density_sees_directions=self.coarse.density.sees_directions,
-            coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
-            bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
-        )
         if encoded.detailed is None:
-            return scene
+            return scene_of(None, None)
         detailed, encoded_width = encoded.detailed[index][present], encoded.views.cameras.width
 
         @lru_cache(maxsize=1)
         def at_width(width: int) -> Scene:
-            if width <= encoded_width:
-                return scene
-            return replace(scene, **fields(Pictures.of(detailed, width)))
+            return scene_of(Pictures.of(detailed, width) if width > encoded_width else None, None)
 
-        return replace(scene, at_width=at_width)
+        return scene_of(None, at_width)
 
     def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
         """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""

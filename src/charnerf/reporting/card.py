@@ -3,7 +3,6 @@
 The card is a Markdown file with the lines of BEGIN and END in it; what stands between them is written anew.
 """
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from charnerf.data.layout import write_text_atomically
 from charnerf.errors import ConfigError, DataError
+from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.reporting.parts import BASELINE_NAMES, COLUMNS, cell, metric_cells, read_metrics, seconds_text
 from charnerf.reporting.plots import Curve, plot_training, read_curve
 
@@ -45,7 +45,7 @@ def write_card(card: Path, curves: Sequence[Path], measured: Mapping[str, Path])
     for title, metrics in found.items():
         copy = card.parent / f"metrics_{_slug(title)}.json"
         if _metrics_file(measured[title]).resolve() != copy.resolve():
-            write_text_atomically(copy, json.dumps(_published(metrics), indent=1) + "\n")
+            write_metrics(copy, _published(metrics))
         files.append(copy)
         lines += ["", *_tables(title, metrics, copy.name)]
     start, end = text.index(BEGIN), text.index(END)

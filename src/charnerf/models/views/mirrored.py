@@ -5,7 +5,7 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.geometry.cameras import mirror_cameras
+from charnerf.geometry.cameras import mirror_views
 from charnerf.models.views.base import AbstractViews
 from charnerf.types import Cameras, SourceViews
 
@@ -26,15 +26,14 @@ class MirroredSide(AbstractViews):
         columns = (sideways & views.present & ~views.mirrored).any(0).nonzero()[:, 0]
         if len(columns) == 0:
             return views
-        side = views[:, columns]
-        flipped = mirror_cameras(side.cameras)
+        side = mirror_views(views[:, columns])
         cameras = views.cameras
 
         def appended(name: str) -> Tensor:
-            return torch.cat((getattr(cameras, name), getattr(flipped, name)), dim=1)
+            return torch.cat((getattr(cameras, name), getattr(side.cameras, name)), dim=1)
 
         return SourceViews(
-            images=torch.cat((views.images, side.images.flip(-1)), dim=1),
+            images=torch.cat((views.images, side.images), dim=1),
             cameras=Cameras(
                 world_from_camera=appended("world_from_camera"),
                 focal=appended("focal"),
