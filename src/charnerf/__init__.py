@@ -10,6 +10,7 @@ The names below are imported when they are first used, so that `import charnerf`
 """
 
 import importlib
+import os
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,10 @@ if TYPE_CHECKING:
     from charnerf.model_api import Model as Model
     from charnerf.runs import load as load
     from charnerf.runs import save_weights as save_weights
+
+# Before torch starts its threads: on busy cores threads that spin for one another take the time that those waited for need.
+# Two threads beside two busy processes need half the time so, alone no more (docs/benchmarks.md).
+os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 try:
     __version__ = version("charnerf")
