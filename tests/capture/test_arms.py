@@ -67,7 +67,8 @@ def test_arms_turn_about_the_shoulders(seed):
         hand = lowered[hands & (before[..., 0] * side > 0)].mean(0)
         shoulder = np.array((side * TRUNK, 0.0, SHOULDER))
         assert np.linalg.norm(hand - shoulder) <= (REACH - TRUNK) * 1.01
-        assert np.linalg.norm(hand - shoulder) >= (REACH - TRUNK) * 0.75  # elbows bend
+        assert np.linalg.norm(hand - shoulder) >= (REACH - TRUNK) * 0.6  # elbows bend, by 100 degrees at most
+        assert hand[1] < 0.02  # forward, if anywhere
     left, right = (
         np.unique(lowered[hands & (before[..., 0] * side > 0)][:, 2].round(5)) for side in (-1.0, 1.0)
     )
@@ -76,6 +77,16 @@ def test_arms_turn_about_the_shoulders(seed):
     arms.merge_vertices(digits_vertex=5)
     assert arms.is_watertight
     assert 0.7 < arms.volume / (2 * REACH * 0.15**2) < 1.3
+
+
+def test_forearms_point_forward_at_times():
+    """Hands come as far forward as forearms are long, in some of the poses, and stay beside the body in others."""
+    surface, _ = t_pose()
+    hands = np.abs(surface.triangles[..., 0]) > REACH - 1e-6
+    forward = [-lower_arms(surface, np.random.default_rng(seed))[hands][:, 1].mean() for seed in range(40)]
+    forearm = 0.55 * (REACH - TRUNK)
+    assert max(forward) > 0.8 * forearm
+    assert np.mean(np.array(forward) < 0.4 * forearm) > 0.4
 
 
 def test_draws_do_not_depend_on_the_character():

@@ -1,7 +1,8 @@
 """Arms held out to the sides, lowered and bent: a T pose becomes an A pose.
 
 Most characters that can be had stand in T pose, and drawings show both. A smooth turn about the shoulders, found in the outline
-from the front, and a smaller one about the elbows.
+from the front, and one about the elbows, forward too: arms that always lie beside the body teach a network to put them there,
+whatever the side drawing shows.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,10 @@ from charnerf.capture.outline import CELL_WIDTH, ROW_HEIGHT, middle_runs
 from charnerf.data.surface_mesh import SurfaceMesh
 
 LOWERED = (np.radians(10.0), np.radians(80.0))  # how far arms are turned down
-_BENT = np.radians(15.0)  # standard deviation of the elbows' turns
+_BENT = np.radians(15.0)  # standard deviation of the elbows' turns up and down
+_FORWARD = np.radians(
+    100.0
+)  # farthest that forearms are turned forward; half of them by less than a quarter of it
 _OUTER = 0.6  # share of the reach beyond which there is nothing but arm
 _THICKEST = 0.5  # largest extent in height of the outer arms, over the reach, of a T pose
 _LOWEST = 0.4  # share of the height below which no arm is level
@@ -30,7 +34,7 @@ def lower_arms(surface: SurfaceMesh, rng: np.random.Generator) -> np.ndarray:
     Returns:
         float64 (M, 3, 3); those of the surface where it does not hold its arms out level.
     """
-    down, elbows, forward = rng.uniform(*LOWERED), rng.normal(0.0, _BENT), abs(rng.normal(0.0, _BENT))
+    down, elbows, forward = rng.uniform(*LOWERED), rng.normal(0.0, _BENT), _FORWARD * rng.random() ** 2
     triangles = surface.triangles.astype(np.float64)
     arms = find_arms(surface, middle_runs(surface))
     if arms is None:
