@@ -350,7 +350,7 @@ def test_what_a_class_refuses_is_told_before_any_work() -> None:
 
 
 def test_settings_without_effect_are_warned_of(conf: Path) -> None:
-    for option in ("image_hull", "image_hull_section"):
+    for option in ("image_hull", "image_hull_section", "image_hull_section_consistency"):
         with pytest.warns(UserWarning, match=rf"features={option} reads the hull, but model\.hull=false"):
             check_command_line(["scale=smoke", f"features={option}", "model.hull=false"], conf=conf)
     phase = "_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0"

@@ -20,6 +20,7 @@ from charnerf.models.encoders.single import SingleHourglass
 from charnerf.models.features.image import ImageFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
 from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
+from charnerf.models.features.image_hull_section_consistency import ImageHullSectionConsistencyFeatures
 from charnerf.models.field import Field
 from charnerf.models.heads.blend import BlendHead
 from charnerf.models.heads.radiance import RadianceHead
@@ -104,6 +105,7 @@ def tiny_model(
         "image": ImageFeatures,
         "image_hull": ImageHullFeatures,
         "image_hull_section": ImageHullSectionFeatures,
+        "image_hull_section_consistency": ImageHullSectionConsistencyFeatures,
     }
     inputs = options[features]()
 

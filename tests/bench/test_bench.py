@@ -58,7 +58,7 @@ def tiny(person_views) -> Callable[..., Subject]:
     return make
 
 
-@pytest.mark.parametrize("features", ["image_hull", "image_hull_section"])
+@pytest.mark.parametrize("features", ["image_hull", "image_hull_section", "image_hull_section_consistency"])
 @pytest.mark.parametrize("fine", [False, True])
 def test_the_baseline_answers_the_same_fields(fine, features, tiny):
     one = tiny(fine=fine, features=features)

@@ -34,7 +34,7 @@ def person_hull(person_views) -> Hull:
     return tiny_models.tiny_model().carve(person_views)
 
 
-@pytest.mark.parametrize("features", ["image_hull", "image_hull_section"])
+@pytest.mark.parametrize("features", ["image_hull", "image_hull_section", "image_hull_section_consistency"])
 @pytest.mark.parametrize("hull_from", ["batch", "characters"])
 def test_characters_of_different_numbers_of_views_share_a_batch(hull_from, features):
     """In any batch each gets the answer that it gets alone, carved in the batch or each by itself before."""

@@ -14,6 +14,10 @@ from charnerf.models.features.base import ViewReadings
 from charnerf.models.features.image import ImageFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
 from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
+from charnerf.models.features.image_hull_section_consistency import (
+    ImageHullSectionConsistencyFeatures,
+    consistency,
+)
 from charnerf.models.heads.blend import BlendHead
 from charnerf.models.heads.radiance import RadianceHead
 from charnerf.models.inputs import PointInputs
@@ -159,7 +163,39 @@ def test_image_hull_features_by_hand():
     both = ImageHullSectionFeatures()
     torch.testing.assert_close(both(readings)[0, 1], torch.cat((features(readings)[0, 1], section)))
     assert both.num_extras == 28
+    all_three = ImageHullSectionConsistencyFeatures()
+    torch.testing.assert_close(all_three(readings)[..., :28], both(readings))
+    torch.testing.assert_close(all_three(readings)[..., 28:], consistency(readings.source_rgb))
+    assert all_three.num_extras == 36
     assert ImageFeatures()(readings).shape == (1, 2, 0) and ImageFeatures().num_extras == 0
+
+
+def test_consistency_by_hand():
+    """Black, black and a blue that is 0.5 away: two agree, the third is alone."""
+    numbers = consistency(torch.tensor((((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.5)),)))[0]
+    alone = torch.tensor((1.0, 4.0, 0.0)).tanh().tolist()
+    expected = torch.tensor(
+        (
+            (0.0, 0.0, 0.0, 0.25, 1 / 6, 0.0, 0.0, -0.25),
+            (0.0, 0.0, 0.0, 0.25, 1 / 6, 0.0, 0.0, -0.25),
+            (*alone, 0.5, 1 / 6, 0.0, 0.0, 0.5),
+        )
+    )
+    torch.testing.assert_close(numbers, expected, atol=1e-3, rtol=0)
+
+
+@pytest.mark.parametrize("num_views", [1, 2, 5])
+def test_consistency_knows_no_order_and_has_gradients(num_views):
+    """Also where all colours are alike and the distances are zero."""
+    rgb = torch.rand(20, num_views, 3, dtype=torch.float64)
+    order = torch.randperm(num_views)
+    torch.testing.assert_close(consistency(rgb)[:, order], consistency(rgb[:, order]))
+    alike = rgb[:, :1].expand(-1, num_views, -1).clone().requires_grad_()
+    numbers = consistency(alike)
+    assert numbers.shape == (20, num_views, 8) and numbers.abs().max() < 1e-3
+    if num_views > 1:
+        (gradient,) = torch.autograd.grad(numbers.sum(), alike)
+        assert torch.isfinite(gradient).all()
 
 
 def test_the_mirrored_side_of_a_symmetric_figure_is_its_picture_from_270():

@@ -9,7 +9,11 @@ from charnerf.schedule import Phase, PhaseSchedule
 
 Rule = Callable[..., Iterator[tuple[str, str]]]
 
-HULL_FEATURES = {"ImageHullFeatures": "image_hull", "ImageHullSectionFeatures": "image_hull_section"}
+HULL_FEATURES = {
+    "ImageHullFeatures": "image_hull",
+    "ImageHullSectionFeatures": "image_hull_section",
+    "ImageHullSectionConsistencyFeatures": "image_hull_section_consistency",
+}
 
 
 def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[tuple[str, str]]:
