@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # The recipe of the next weights, on a CPU or on a GPU where there is one: data, training, figures.
 #   docs/weights/make.sh FOLDER [more overrides of train.py]
-# FOLDER/meshes/{train,train_extra,val,test} hold the mesh files of docs/characters.md. Each step goes on where it was interrupted;
-# a data set that is there is not made again. A GPU has room for `scale=base trainer=gpu`.
+# FOLDER/meshes/{train,train_extra,val,test} hold the mesh files of docs/characters.md without those of quaternius-ultimate, whose skin
+# is black by a fault of their export: these lie in FOLDER/meshes/ultimate and get skin colours here. Each step goes on where it was
+# interrupted; a data set that is there is not made again. A GPU has room for `scale=base trainer=gpu`.
 set -euo pipefail
 
 folder="$1"
@@ -16,6 +17,27 @@ capture() { # split, folders of meshes separated by spaces, further options
   charnerf capture "${folders[@]}" -o "$data" --split "$1" "${@:3}"
   touch "$data/.$1"
 }
+if [ ! -e "$folder/meshes/chibi" ]; then
+  python - "$folder/meshes" <<'PYTHON'
+import sys
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+meshes = Path(sys.argv[1])
+tones = [(69, 22, 3), (146, 61, 13), (191, 107, 36), (225, 139, 53), (255, 182, 107), (29, 9, 1)]  # linear
+made = meshes / "chibi.part"
+made.mkdir(exist_ok=True)
+for number, file in enumerate(sorted((meshes / "ultimate").glob("*.glb"))):
+    scene = trimesh.load(file, process=False)
+    for part in scene.geometry.values():
+        if part.visual.material.name == "Skin":
+            part.visual.material.baseColorFactor = np.array((*tones[number % len(tones)], 255), np.uint8)
+    scene.export(made / file.name)
+made.rename(meshes / "chibi")
+PYTHON
+fi
 if [ ! -e "$data/.embedded" ]; then
   charnerf generate -o "$data" --train 240 --val 0 --test 0 --seed 0
   python - "$data/dataset.json" <<'PYTHON'
@@ -28,19 +50,20 @@ PYTHON
 fi
 capture train train
 capture train_extra train_extra
+capture chibi chibi
 capture val val
 capture test test
-capture variants "train train_extra" --views 24 --variants 2
-capture swaps "train train_extra" --views 24 --swaps 3
+capture variants "train train_extra chibi" --views 24 --variants 3 --seed 1
+capture swaps "train train_extra chibi" --views 24 --swaps 6 --seed 1
 
 run="$folder/run"
 resume=()
 [ -e "$run/checkpoints/last.ckpt" ] && resume=("ckpt_path=$run/checkpoints/last.ckpt")
 python train.py data=folder "data.root=$data" \
-  'sampling.train_splits=[train,train_extra,train,train_extra,variants,swaps,embedded]' \
-  features=image_hull_section encoder.coarse_width=64 encoder.coarse_channels=64 augmentation=stretch_recolor \
+  'sampling.train_splits=[train,train_extra,chibi,train,train_extra,chibi,variants,swaps,embedded]' \
+  features=image_hull_section_consistency encoder.coarse_width=64 encoder.coarse_channels=64 augmentation=stretch_recolor \
   augmentation.recolor_share=0.7 augmentation.stretch_share=0.8 averaging.decay=0.998 sampling.foreground_share=0.65 \
-  budget.seconds=7200 sampling.memory_mib=10000 \
+  budget.seconds=3960 sampling.memory_mib=16000 \
   "hydra.run.dir=$run" "${resume[@]}" "$@"
 
 charnerf evaluate "$run" --data "$data" --split test -o "$folder/measured" \
