@@ -1,5 +1,6 @@
 """Hull and cross-sections, and how well the drawings' colours agree at the point (beyond the paper)."""
 
+from functools import reduce
 from typing import final
 
 import torch
@@ -35,25 +36,23 @@ def consistency(rgb: Tensor) -> Tensor:
     num_views = rgb.shape[1]
     if num_views < 2:
         return rgb.new_zeros(*rgb.shape[:2], 8)
-    views = rgb.unbind(1)
-    apart: list[list[Tensor]] = [[] for _ in views]
-    for i, one in enumerate(views):
+    colours = rgb.permute(
+        1, 2, 0
+    ).contiguous()  # (V, 3, P): points in a row, or each pair strides over memory
+    apart: list[list[Tensor]] = [[] for _ in range(num_views)]
+    for i in range(num_views):
         for j in range(i):
-            distance = (one - views[j]).square().sum(-1)
+            distance = (colours[i] - colours[j]).square().sum(0).add(1e-8).sqrt()
             apart[i].append(distance)
             apart[j].append(distance)
-    distances = torch.stack([torch.stack(row, dim=-1) for row in apart], dim=1).add(1e-8).sqrt()
-    nearest = distances.amin(-1)
-    smallest = nearest.amin(1, keepdim=True).expand_as(nearest)
-    scalars = torch.stack(
-        (
-            torch.tanh(2.0 * nearest),
-            torch.tanh(8.0 * nearest),
-            torch.tanh(4.0 * smallest),
-            distances.mean(-1),
-            nearest.mean(1, keepdim=True).expand_as(nearest),
-        ),
-        dim=-1,
+    nearest = torch.stack([reduce(torch.minimum, row) for row in apart])
+    mean = torch.stack([reduce(torch.add, row) for row in apart]) / (num_views - 1)
+    scalars = (
+        torch.tanh(2.0 * nearest),
+        torch.tanh(8.0 * nearest),
+        torch.tanh(4.0 * nearest.amin(0)).expand_as(nearest),
+        mean,
+        nearest.mean(0).expand_as(nearest),
     )
-    others = (rgb.sum(1, keepdim=True) - rgb) / (num_views - 1)
-    return torch.cat((scalars, rgb - others), dim=-1)
+    others = (colours.sum(0) - colours) / (num_views - 1)
+    return torch.cat((torch.stack(scalars, dim=1), colours - others), dim=1).permute(2, 0, 1)
