@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import trimesh
 
@@ -12,6 +13,7 @@ from charnerf.meshing.calibrate import LevelChoice, choose_level
 from charnerf.meshing.colour import colour_vertices
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
+from charnerf.meshing.outlines import gain_at, raised_rays, raised_scene
 from charnerf.meshing.smooth import smooth_mesh
 from charnerf.meshing.texture import Textured, Texturing, texture_mesh
 from charnerf.types import LeftOut, Scene, SourceViews
@@ -24,12 +26,14 @@ class FoundSurface:
     Attributes:
         extraction: The surface and what was removed from it.
         choice: The evidence for its level; None where the caller gave it.
+        missed: Share of the drawings' pixels of the figure that this level met no surface at, until densities were raised there.
         left_out: Grid points not evaluated.
         seconds: Time it took.
     """
 
     extraction: Extraction
     choice: LevelChoice | None
+    missed: float
     left_out: LeftOut
     seconds: float
 
@@ -43,6 +47,7 @@ class BuiltMesh:
         surface: The same before its vertices were split at texture seams; `mesh` itself without a texture.
         level: Density of the surface, 1/m.
         choice: The evidence for the level; None where the caller gave it.
+        missed: Share of the drawings' pixels of the figure whose densities were raised to the level (see outlines.py).
         num_extracted: Faces before decimation.
         num_floaters: Parts dropped.
         num_cavities: Hidden holes dropped.
@@ -55,6 +60,7 @@ class BuiltMesh:
     surface: trimesh.Trimesh
     level: float
     choice: LevelChoice | None
+    missed: float
     num_extracted: int
     num_floaters: int
     num_cavities: int
@@ -80,7 +86,7 @@ def build_mesh(
 
     Args:
         scene: One character's field.
-        views: Its drawings (B = 1), whose silhouettes are compared with the surface's.
+        views: Its drawings (B = 1): densities are raised where the surface would miss their silhouettes; None has none.
         resolution: Grid points along the longest side of the hull.
         num_cameras: Cameras whose directions the density is averaged over.
         faces: Faces after decimation; None keeps all.
@@ -120,14 +126,20 @@ def find_surface(
     """The surface of a field, all of its faces; arguments and errors as of `build_mesh`."""
     start = time.perf_counter()
     sampler = GridSampler(scene, resolution=resolution, num_cameras=num_cameras, on_points=on_points)
-    choice = None
+    choice, raised = None, []
+    coarse = sampler.evaluate_coarse(2 if resolution < 192 else 4)
     if level is None:
-        choice = choose_level(sampler.evaluate_coarse(2 if resolution < 192 else 4), views)
+        choice = choose_level(coarse, views)
         level = choice.chosen.level
+    if views is not None:
+        raised = raised_rays(scene, views, level, coarse)
+        if any(one.num_missed for one in raised):
+            sampler.rescale(raised_scene(scene, raised), partial(gain_at, raised))
     grid = sampler.evaluate_surface(level)
     extraction = extract_surface(grid, level, density_at=sampler.density_at)
     extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, smooth))
-    return FoundSurface(extraction, choice, grid.left_out, time.perf_counter() - start)
+    missed = sum(one.num_missed for one in raised) / max(1, sum(one.num_pixels for one in raised))
+    return FoundSurface(extraction, choice, missed, grid.left_out, time.perf_counter() - start)
 
 
 def finish_mesh(
@@ -154,6 +166,7 @@ def finish_mesh(
         surface=surface,
         level=extraction.level,
         choice=found.choice,
+        missed=found.missed,
         num_extracted=len(extraction.mesh.faces),
         num_floaters=extraction.num_floaters,
         num_cavities=extraction.num_cavities,

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import grid_sample
 
 from charnerf.errors import NumericalError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles, pixel_centres, pixel_rays
@@ -28,7 +27,6 @@ from charnerf.meshing.density_grid import DensityGrid
 from charnerf.types import Cameras, RayBundle, SourceViews
 
 LEVELS = tuple(float(x) for x in np.round(np.geomspace(2.0, 400.0, 24), 3))  # 1/m
-MIDDLE_LEVEL = 20.0  # 1/m; where interpolation between grid points is most faithful
 AROUND = 12  # cameras around the character
 PICTURE = 80  # pixels a side of their pictures
 HALF_GONE = math.log(2.0)  # optical depth at which half of the light is gone
@@ -143,30 +141,24 @@ def _march(grid: DensityGrid, camera: Cameras, stride: int = 1) -> _March:
     pixels = pixel_centres(camera.width, camera.height)[stride // 2 :: stride, stride // 2 :: stride]
     rays = pixel_rays(camera, pixels.reshape(-1, 2).to(camera.focal.dtype))
     rays = RayBundle(rays.origins.float(), rays.directions.float())
-    volume = torch.from_numpy(np.ascontiguousarray(grid.densities))
-    # interpolated in a scale that runs nearly straight through a surface, as density itself does not
-    contrast = (volume / (volume + MIDDLE_LEVEL))[None, None]
+    between = grid.between()
     corner = torch.from_numpy(grid.origin).float()
-    extent = (torch.tensor(volume.shape) - 1) * grid.spacing
+    extent = (torch.tensor(grid.densities.shape) - 1) * grid.spacing
     near, far = box_interval(rays, corner, corner + extent)
     levels = torch.tensor(LEVELS)
-    thresholds = levels / (levels + MIDDLE_LEVEL)
-    num = int(1.5 * max(volume.shape))
+    num = int(1.5 * max(grid.densities.shape))
     middle = (torch.arange(num) + 0.5) / num
     first = torch.full((len(near), len(LEVELS)), math.inf)
     median = torch.full((len(near),), math.inf)
     for part in (far > near).nonzero()[:, 0].split(4096):
         length = far[part] - near[part]
         points = points_along(rays[part], near[part, None] + length[:, None] * middle)
-        at = 2.0 * (points - corner) / extent - 1.0
-        # grid_sample takes the last axis of the volume first
-        read = grid_sample(contrast, at.flip(-1)[None, None], align_corners=True)[0, 0, 0]
-        densities = MIDDLE_LEVEL * read / (1.0 - read).clamp_min(1e-6)
+        densities = between(points)
         depth = (densities.cumsum(-1) * (length / num)[:, None]).contiguous()
         half_gone = torch.searchsorted(depth, torch.full((len(part), 1), HALF_GONE))
         median[part] = _depth_at(half_gone + 0.5, near, far, part, num)[:, 0]
-        peak = read.cummax(-1).values.contiguous()
-        index = torch.searchsorted(peak, thresholds.expand(len(part), -1).contiguous())
+        peak = densities.cummax(-1).values.contiguous()
+        index = torch.searchsorted(peak, levels.expand(len(part), -1).contiguous())
         # passed between the centres of the sample before and of this one, that is at its start on average
         first[part] = _depth_at(index, near, far, part, num)
     return _March(first, median)

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from scipy import ndimage
 from torch import Tensor
+from torch.nn import functional as F
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import fibonacci_hemisphere
@@ -24,6 +25,7 @@ from charnerf.types import LeftOut, Scene
 BLOCK = 4  # cells a side
 CHUNK = 8192  # points evaluated at once; larger batches leave the caches
 CAMERA_DISTANCE = 4.0  # metres, of the cameras whose directions are averaged over: that of the captures
+MIDDLE_LEVEL = 20.0  # 1/m; where interpolation between grid points is most faithful
 ACTIVE_SHARE = 0.25  # a block counts as near the surface from this share of the level on
 
 
@@ -44,6 +46,38 @@ class DensityGrid:
     spacing: float
     left_out: LeftOut
 
+    def between(self, device: torch.device | str = "cpu") -> Callable[[Tensor], Tensor]:
+        """The function that reads densities (...) at points (..., 3), m, between the grid's; the border's beyond it.
+
+        Interpolated in a scale that runs nearly straight through a surface, as density itself does not.
+        """
+        volume = torch.from_numpy(np.ascontiguousarray(self.densities)).to(device)
+        contrast = (volume / (volume + MIDDLE_LEVEL))[None, None]
+        corner = torch.from_numpy(self.origin).to(volume)
+        extent = (torch.tensor(volume.shape) - 1).to(volume) * self.spacing
+
+        def read(points: Tensor) -> Tensor:
+            at = 2.0 * (points.to(volume) - corner) / extent - 1.0
+            # grid_sample takes the last axis of the volume first
+            flat = at.flip(-1).reshape(1, 1, 1, -1, 3)
+            found = F.grid_sample(contrast, flat, align_corners=True, padding_mode="border").view(
+                points.shape[:-1]
+            )
+            return MIDDLE_LEVEL * found / (1.0 - found).clamp_min(1e-6)
+
+        return read
+
+
+def densities_inside(scene: Scene, points: Tensor, view_dirs: Tensor) -> Tensor:
+    """Densities (P,), 1/m, of points (P, 3) seen along view_dirs (P, 3); zero outside the hull, where nothing is evaluated."""
+    inside = torch.arange(len(points), device=points.device)
+    if scene.hull is not None:
+        inside = hull_contains(scene.hull, points).nonzero()[:, 0]
+    densities = points.new_zeros(len(points))
+    for part in inside.split(CHUNK):
+        densities[part] = scene.answer_densities(points[part], view_dirs[part]).densities
+    return densities
+
 
 def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
     """Density averaged over cameras around the character.
@@ -62,21 +96,14 @@ def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
 
     Source: paper, Mesh Reconstruction (several cameras, averaged, instead of the zero direction).
     """
-    densities = points.new_zeros(points.shape[0])
-    inside = torch.arange(points.shape[0], device=points.device)
-    if scene.hull is not None:
-        inside = hull_contains(scene.hull, points).nonzero()[:, 0]
-    positions = camera_positions(scene, num_cameras).to(points)
-    for part in inside.split(CHUNK):
-        here = points[part]
-        if scene.density_sees_directions:
-            answers = [
-                scene.answer_densities(here, safe_normalize(here - position)).densities
-                for position in positions
-            ]
-            densities[part] = torch.stack(answers).mean(0)
-        else:
-            densities[part] = scene.answer_densities(here, torch.zeros_like(here)).densities
+    if scene.density_sees_directions:
+        positions = camera_positions(scene, num_cameras).to(points)
+        answers = [
+            densities_inside(scene, points, safe_normalize(points - position)) for position in positions
+        ]
+        densities = torch.stack(answers).mean(0)
+    else:
+        densities = densities_inside(scene, points, torch.zeros_like(points))
     if not bool(densities.isfinite().all()):
         bad = int((~densities.isfinite()).sum())
         raise NumericalError(
@@ -231,6 +258,15 @@ class GridSampler:
         if unknown.any():
             at = np.argwhere(unknown).T / 2.0
             self.values[unknown] = ndimage.map_coordinates(lattice, at, order=1, mode="nearest")
+
+    @torch.no_grad()
+    def rescale(self, scene: Scene, gain: Callable[[Tensor], Tensor]) -> None:
+        """Go on with a scene whose densities are those so far times `gain` of points (P, 3)."""
+        index = np.argwhere(self.values > 0.0)
+        for start in range(0, len(index), CHUNK):
+            part = index[start : start + CHUNK]
+            self.values[tuple(part.T)] *= gain(self._points(part)).cpu().numpy()
+        self._scene = scene
 
     @torch.no_grad()
     def density_at(self, points: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from charnerf.geometry.hull import hull_contains
 from charnerf.geometry.occupied import coarse_occupancy
+from charnerf.meshing.density_grid import densities_inside
 from charnerf.types import DensityAnswer, FieldFunction, FieldOutput, Hull, Scene, TensorRecord
 
 OTHER_SIDE = 0.01  # weight of the mirrored side's colour: it counts only where the own side is empty
@@ -37,7 +38,7 @@ def symmetric_scene(scene: Scene) -> Scene:
     """
 
     def densities(points: Tensor, view_dirs: Tensor) -> DensityAnswer:
-        both = [_inside(scene, p, d) for p, d in ((points, view_dirs), mirrored(points, view_dirs))]
+        both = [densities_inside(scene, p, d) for p, d in ((points, view_dirs), mirrored(points, view_dirs))]
         mean = 0.5 * (both[0] + both[1])
         return DensityAnswer(
             mean, _Asked(points, view_dirs), lambda asked: field(asked.points, asked.view_dirs).rgb
@@ -61,15 +62,6 @@ def mirrored(points: Tensor, view_dirs: Tensor) -> tuple[Tensor, Tensor]:
     """Points and directions (P, 3) seen in the mirror x = 0."""
     flip = points.new_tensor((-1.0, 1.0, 1.0))
     return points * flip, view_dirs * flip
-
-
-def _inside(scene: Scene, points: Tensor, view_dirs: Tensor) -> Tensor:
-    """Densities (P,), zero outside the hull, where nothing is evaluated."""
-    if scene.hull is None:
-        return scene.answer_densities(points, view_dirs).densities
-    index = hull_contains(scene.hull, points).nonzero()[:, 0]
-    found = scene.answer_densities(points[index], view_dirs[index]).densities
-    return points.new_zeros(len(points)).index_copy(0, index, found)
 
 
 def _symmetric_field(scene: Scene) -> FieldFunction:

@@ -78,6 +78,7 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
     lines = [
         f"Surface where the density is {built.level:.3g} per metre; Euler number "
         f"{built.surface.euler_number}.",
+        f"{100 * built.missed:.1f} % of the figure's pixels in the drawings met no surface; densities were raised there.",
         f"{100 * share:.1f} % of the grid's points were left out: outside the hull or away from the surface.",
         f"{built.num_floaters} loose parts and {built.num_cavities} hidden cavities were dropped.",
         f"{built.num_extracted} faces before decimation.",

@@ -1,0 +1,132 @@
+"""Parts that a drawing shows and a surface of one level misses: densities raised until the surface covers the drawings' outlines.
+
+Where a field does not know at which depth an ear lies, it spreads a thin density over all depths that it may have: seen through,
+dense enough; nowhere as dense as the surface of a chest. A drawing says that something is there. Along each of its rays that
+shows the figure and meets no surface, densities are multiplied until the densest place does: the likeliest depth.
+
+Letters: R rays, S samples on each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from charnerf.geometry.cameras import pixel_rays, project_into_all
+from charnerf.geometry.rays import box_interval, points_along
+from charnerf.meshing.density_grid import DensityGrid, densities_inside
+from charnerf.types import Cameras, DensityAnswer, FieldFunction, FieldOutput, Scene, SourceViews
+
+MASK_ALPHA = 0.5
+ABOVE = 1.1  # of the level: where the densest place of a ray is brought to; what is 0.91 times as dense is inside then
+MOST = 30.0  # times; what would need more is no part of the figure that the field knows of
+SURE = 2.0  # of the level: a ray that is this dense on the coarse grid meets the surface and is not looked at again
+STEP = 0.012  # m, between samples
+RAYS_AT_ONCE = 512
+
+
+@dataclass(frozen=True)
+class RaisedRays:
+    """By how much densities are multiplied along the rays of one drawing.
+
+    Attributes:
+        camera: The drawing's, (1,).
+        gains: (H, W), at least 1.
+        num_missed: Pixels of the figure whose rays met no surface.
+        num_pixels: Pixels of the figure.
+    """
+
+    camera: Cameras
+    gains: Tensor
+    num_missed: int
+    num_pixels: int
+
+
+@torch.no_grad()
+def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityGrid) -> list[RaisedRays]:
+    """Find the rays of drawings that show the figure and meet no surface, and what mends that.
+
+    Args:
+        scene: One character's field.
+        views: Its drawings (B = 1); mirrored ones show nothing that was drawn.
+        level: Density of the surface, 1/m.
+        coarse: Densities of the same field: what is dense there needs no second look.
+
+    Returns:
+        One entry a drawing.
+    """
+    found = []
+    for v in (views.present[0] & ~views.mirrored[0]).nonzero()[:, 0].tolist():
+        camera, alpha = views.cameras[0, v : v + 1], views.images[0, v, 3]
+        mask = alpha > MASK_ALPHA
+        peaks = torch.full_like(alpha, torch.inf)
+        peaks[mask] = _peaks(scene, camera, mask, coarse, SURE * level)
+        gains = (ABOVE * level / peaks.clamp_min(torch.finfo(peaks.dtype).tiny)).clamp_min(1.0)
+        missed = int((peaks < level).sum())
+        # a gain of its own for every pixel would leave stairs: the largest around, smoothed
+        logs = torch.where(gains > MOST, 1.0, gains).log()[None, None]
+        logs = F.avg_pool2d(F.max_pool2d(logs, 3, stride=1, padding=1), 3, stride=1, padding=1)
+        found.append(RaisedRays(camera, logs[0, 0].exp(), missed, int(mask.sum())))
+    return found
+
+
+def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sure: float) -> Tensor:
+    """Largest density inside the hull along the rays of a mask's pixels (H, W), 1/m; infinite where the grid reaches `sure`."""
+    y, x = mask.nonzero().unbind(-1)
+    rays = pixel_rays(camera[0], torch.stack((x + 0.5, y + 0.5), dim=-1).to(camera.focal.dtype))
+    box = (scene.box_min, scene.box_max) if scene.hull is None else (scene.hull.box_min, scene.hull.box_max)
+    near, far = box_interval(rays, *box)
+    if len(near) == 0:
+        return near
+    num = max(2, int(float((far - near).max()) / STEP))
+    share = (torch.arange(num, dtype=near.dtype, device=near.device) + 0.5) / num
+    known = coarse.between(near.device)
+    peaks = torch.full_like(near, torch.inf)
+    for part in torch.arange(len(near), device=near.device).split(RAYS_AT_ONCE):
+        t = near[part, None] + (far - near).clamp_min(0.0)[part, None] * share
+        points = points_along(rays[part], t)
+        unsure = (known(points).amax(-1) < sure).nonzero()[:, 0]
+        dirs = rays.directions[part[unsure], None].expand(-1, num, -1)
+        densities = densities_inside(scene, points[unsure].reshape(-1, 3), dirs.reshape(-1, 3))
+        peaks[part[unsure]] = densities.view(-1, num).amax(-1)
+    return peaks
+
+
+def gain_at(raised: list[RaisedRays], points: Tensor) -> Tensor:
+    """By how much densities at points (P, 3) are multiplied, (P,): the largest gain where rays of several drawings meet."""
+    most = points.new_ones(len(points))
+    for one in raised:
+        pixels = project_into_all(one.camera, points)[0][:, 0]
+        size = pixels.new_tensor((one.camera.width, one.camera.height))
+        at = (2.0 * pixels / size - 1.0)[None, None]
+        gains = one.gains[None, None].to(points.dtype)
+        read = F.grid_sample(gains, at, align_corners=False, padding_mode="border")
+        most = torch.maximum(most, read[0, 0, 0])
+    return most
+
+
+def raised_scene(scene: Scene, raised: list[RaisedRays]) -> Scene:
+    """The scene with its densities multiplied by `gain_at`."""
+
+    def field_of(field: FieldFunction) -> FieldFunction:
+        def answer(points: Tensor, view_dirs: Tensor) -> FieldOutput:
+            found = field(points, view_dirs)
+            return FieldOutput(rgb=found.rgb, densities=found.densities * gain_at(raised, points))
+
+        return answer
+
+    def densities(points: Tensor, view_dirs: Tensor) -> DensityAnswer:
+        found = scene.answer_densities(points, view_dirs)
+        return replace(found, densities=found.densities * gain_at(raised, points))
+
+    at_width = scene.at_width
+    return replace(
+        scene,
+        coarse=field_of(scene.coarse),
+        fine=None if scene.fine is None else field_of(scene.fine),
+        densities_first=densities,
+        at_width=None if at_width is None else lambda width: raised_scene(at_width(width), raised),
+    )

@@ -1,0 +1,97 @@
+"""Surfaces that would miss parts of the drawings' outlines are completed there, and nowhere else."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from analytic_scenes import capsule, figure, scene_of
+
+import helpers
+from charnerf.meshing.build import build_mesh
+from charnerf.meshing.density_grid import GridSampler
+from charnerf.meshing.outlines import ABOVE, gain_at, raised_rays, raised_scene
+from charnerf.meshing.picture import render_mesh
+from charnerf.types import FieldOutput, Scene, SourceViews
+
+LEVEL = 20.0
+
+
+def scene(hazy: float | None = None) -> Scene:
+    """The figure, its left forearm (x > 0.4) replaced by haze 40 cm deep of so many 1/m, densest in its middle."""
+    whole = scene_of(figure)
+
+    def field(points: torch.Tensor, view_dirs: torch.Tensor) -> FieldOutput:
+        found = whole.field(points, view_dirs)
+        if hazy is None:
+            return found
+        spread = points * points.new_tensor((1.0, 0.25, 1.0))
+        haze = capsule(spread, (0.3, 0, 1.45), (0.75, 0, 1.45), 0.09) > 0
+        depth = hazy * (1.0 - points[:, 1].abs())
+        return replace(found, densities=torch.where(points[:, 0] > 0.4, haze * depth, found.densities))
+
+    return Scene(field, None, None, whole.box_min, whole.box_max, density_sees_directions=False)
+
+
+@pytest.fixture(scope="module")
+def drawings() -> SourceViews:
+    """The whole figure as front, side and back drawing, from its own mesh."""
+    cameras = helpers.source_cameras(size=128)
+    mesh = build_mesh(scene(), None, resolution=96, level=LEVEL).mesh
+    pictures = torch.from_numpy(render_mesh(mesh, cameras)).movedim(-1, 1)[None].float()
+    flags = torch.zeros(1, len(pictures[0]), dtype=torch.bool)
+    return SourceViews(images=pictures, cameras=cameras[None], present=~flags, mirrored=flags)
+
+
+def covered(mesh, drawings: SourceViews) -> float:
+    """Share of the front drawing's figure that the mesh covers."""
+    found = torch.from_numpy(render_mesh(mesh, drawings.cameras[0])[0][..., 3]) > 0.5
+    mask = drawings.images[0, 0, 3] > 0.5
+    return float((found & mask).sum() / mask.sum())
+
+
+def test_a_hazy_arm_is_part_of_the_mesh_and_lies_where_it_is_densest(drawings):
+    hazy = scene(hazy=6.0)
+    without = build_mesh(hazy, None, resolution=96, level=LEVEL)
+    built = build_mesh(hazy, drawings, resolution=96, level=LEVEL)
+    assert covered(without.mesh, drawings) < 0.92
+    assert covered(built.mesh, drawings) > 0.96
+    assert 0.04 < built.missed < 0.2 and without.missed == 0.0
+    forearm = built.mesh.vertices[built.mesh.vertices[:, 0] > 0.5]
+    assert len(forearm) > 100
+    assert abs(forearm[:, 1].mean()) < 0.03 and abs(forearm[:, 1]).max() < 0.2  # not all of the haze
+
+
+def test_only_missed_rays_are_raised_to_just_above_the_level(drawings):
+    hazy = scene(hazy=6.0)
+    coarse = GridSampler(hazy, resolution=96, num_cameras=1).evaluate_coarse(2)
+    raised = raised_rays(hazy, drawings, LEVEL, coarse)
+    assert [one.num_missed > 0 for one in raised] == [True, False, True]  # from the side the body lies behind
+    inside = torch.tensor(((0.6, 0.0, 1.45), (-0.6, 0.0, 1.45), (0.0, 0.0, 1.2), (1.2, 0.0, 1.9)))
+    torch.testing.assert_close(
+        gain_at(raised, inside), torch.tensor((ABOVE * LEVEL / 6.0, 1.0, 1.0, 1.0)), atol=0.05, rtol=0
+    )
+    dirs = torch.zeros_like(inside)
+    before, after = hazy.field(inside, dirs), raised_scene(hazy, raised).field(inside, dirs)
+    torch.testing.assert_close(after.densities, before.densities * gain_at(raised, inside))
+    torch.testing.assert_close(
+        raised_scene(hazy, raised).answer_densities(inside, dirs).densities, after.densities
+    )
+    assert torch.equal(after.rgb, before.rgb)
+
+
+def test_a_surface_that_covers_its_drawings_stays_as_it_is(drawings):
+    """But for the rim, where a pixel's middle may pass the surface by a hair."""
+    whole = scene()
+    with_drawings = build_mesh(whole, drawings, resolution=64, level=LEVEL)
+    without = build_mesh(whole, None, resolution=64, level=LEVEL)
+    assert with_drawings.missed < 0.03
+    assert abs(with_drawings.mesh.volume / without.mesh.volume - 1.0) < 0.02
+
+
+def test_what_the_field_does_not_know_of_is_not_made_up(drawings):
+    """A drawing of two arms over a field with one: where there is no density, none is multiplied into a surface."""
+    empty = scene(hazy=0.0)
+    built = build_mesh(empty, drawings, resolution=64, level=LEVEL)
+    assert built.mesh.bounds[1, 0] < 0.45
+    nothing = replace(drawings, images=torch.zeros_like(drawings.images))
+    assert build_mesh(empty, nothing, resolution=64, level=LEVEL).missed == 0.0
