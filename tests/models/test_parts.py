@@ -152,7 +152,7 @@ def test_image_hull_features_by_hand():
         source_dirs=torch.tensor((((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),)),
         mirrored=torch.tensor((1.0, 0.0)),
         places=torch.tensor(((0.5, -1.0, 0.25),)),
-        half_lengths=torch.tensor(((0.1, 0.2, 0.8),)),
+        half_lengths=torch.tensor(((0.1, 0.2, 0.8),)) / 1.8,
     )
     numbers = torch.tanh(torch.tensor((0.4, 2.0, 8.0, -0.16, -0.8, -3.2, 0.08, 0.4, 1.6)))
     expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))

@@ -128,7 +128,7 @@ class PixelNeRFLike:
             source_dirs=source_dirs,
             mirrored=maps.views.mirrored.to(points.dtype),
             places=places,
-            half_lengths=half_lengths,
+            half_lengths=half_lengths / self.network.box_half_extent,
         )
         network = self.network
         encoded = field.single_view.locate(

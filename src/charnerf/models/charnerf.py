@@ -212,7 +212,7 @@ class CharNeRF(nn.Module):
             source_dirs=sight.source_dirs,
             mirrored=mirrored,
             places=places,
-            half_lengths=half_lengths,
+            half_lengths=half_lengths / self.box_half_extent,
         )
         return PointInputs(
             latents=sight.latents,

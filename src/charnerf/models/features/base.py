@@ -17,7 +17,7 @@ class ViewReadings:
         source_dirs: (P, V, 3), unit.
         mirrored: (V,), 1 where the view is a mirrored one.
         places: (P, 3), where the point lies in the hull's runs along the world's axes, ends at -1 and 1; 0 if not asked for.
-        half_lengths: (P, 3), m, of those runs; 0 if not asked for.
+        half_lengths: (P, 3), of those runs, in half-extents of the box; 0 if not asked for.
     """
 
     source_rgb: Tensor

@@ -8,7 +8,8 @@ from torch import Tensor
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.features.image_hull import ImageHullFeatures
 
-LENGTH_SCALE = 0.1  # m: half of an arm's thickness
+LENGTH_SCALE = 1.0 / 18.0  # of the box's half-extent: half of an arm's thickness, 0.1 m of 1.8
+LEAST_LENGTH = 0.01 * LENGTH_SCALE
 
 
 @final
@@ -30,7 +31,7 @@ class ImageHullSectionFeatures(AbstractFeatures):
         """Return (P, V, 28)."""
         places, halves = readings.places, readings.half_lengths
         squares = places.square()
-        lengths = (torch.log2(halves.clamp_min(1e-3) / LENGTH_SCALE) / 3.0).clamp(-1.0, 1.0)
+        lengths = (torch.log2(halves.clamp_min(LEAST_LENGTH) / LENGTH_SCALE) / 3.0).clamp(-1.0, 1.0)
         section = torch.cat((places, squares, squares + squares.roll(1, dims=-1), lengths), dim=-1)
         by_view = self.image_hull(readings)
         return torch.cat((by_view, section[:, None].expand(-1, by_view.shape[1], -1)), dim=-1)
