@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from charnerf.runs import save_weights as save_weights
 
 # Before torch starts its threads: on busy cores threads that spin for one another take the time that those waited for need.
-# Two threads beside two busy processes need half the time so, alone no more (docs/benchmarks.md).
-os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+# A hundred thousand turns: fewer cost time on idle cores, see docs/benchmarks.md.
+os.environ.setdefault("GOMP_SPINCOUNT", "100000")
 
 try:
     __version__ = version("charnerf")
