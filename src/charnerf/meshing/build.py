@@ -13,7 +13,7 @@ from charnerf.meshing.calibrate import LevelChoice, choose_level
 from charnerf.meshing.colour import colour_vertices
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
-from charnerf.meshing.outlines import gain_at, raised_rays, raised_scene
+from charnerf.meshing.outlines import gain_at, raised_rays
 from charnerf.meshing.smooth import smooth_mesh
 from charnerf.meshing.texture import Textured, Texturing, texture_mesh
 from charnerf.types import LeftOut, Scene, SourceViews
@@ -134,7 +134,7 @@ def find_surface(
     if views is not None:
         raised = raised_rays(scene, views, level, coarse)
         if any(one.num_missed for one in raised):
-            sampler.rescale(raised_scene(scene, raised), partial(gain_at, raised))
+            sampler.multiply(partial(gain_at, raised))
     grid = sampler.evaluate_surface(level)
     extraction = extract_surface(grid, level, density_at=sampler.density_at)
     extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, smooth))

@@ -68,14 +68,15 @@ class DensityGrid:
         return read
 
 
-def densities_inside(scene: Scene, points: Tensor, view_dirs: Tensor) -> Tensor:
-    """Densities (P,), 1/m, of points (P, 3) seen along view_dirs (P, 3); zero outside the hull, where nothing is evaluated."""
+def densities_inside(scene: Scene, points: Tensor, *view_dirs: Tensor) -> Tensor:
+    """Densities (P,), 1/m, of points (P, 3): the mean over view_dirs, (P, 3) each; zero outside the hull, unevaluated."""
     inside = torch.arange(len(points), device=points.device)
     if scene.hull is not None:
         inside = hull_contains(scene.hull, points).nonzero()[:, 0]
     densities = points.new_zeros(len(points))
     for part in inside.split(CHUNK):
-        densities[part] = scene.answer_densities(points[part], view_dirs[part]).densities
+        answers = [scene.answer_densities(points[part], dirs[part]).densities for dirs in view_dirs]
+        densities[part] = torch.stack(answers).mean(0)
     return densities
 
 
@@ -96,14 +97,11 @@ def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
 
     Source: paper, Mesh Reconstruction (several cameras, averaged, instead of the zero direction).
     """
+    view_dirs = [torch.zeros_like(points)]
     if scene.density_sees_directions:
         positions = camera_positions(scene, num_cameras).to(points)
-        answers = [
-            densities_inside(scene, points, safe_normalize(points - position)) for position in positions
-        ]
-        densities = torch.stack(answers).mean(0)
-    else:
-        densities = densities_inside(scene, points, torch.zeros_like(points))
+        view_dirs = [safe_normalize(points - position) for position in positions]
+    densities = densities_inside(scene, points, *view_dirs)
     if not bool(densities.isfinite().all()):
         bad = int((~densities.isfinite()).sum())
         raise NumericalError(
@@ -152,6 +150,7 @@ class GridSampler:
         if resolution < 16:
             raise DataError(f"resolution: found {resolution} grid points, expected at least 16.")
         self._scene, self._num_cameras, self._on_points = scene, num_cameras, on_points
+        self._gains: list[Callable[[Tensor], Tensor]] = []
         low, high = _occupied_box(scene)
         self.spacing = float((high - low).max()) / (resolution - 3)
         self.origin = low - self.spacing
@@ -187,9 +186,7 @@ class GridSampler:
         index = np.argwhere(wanted & ~self.known)
         for start in range(0, len(index), CHUNK):
             part = index[start : start + CHUNK]
-            self.values[tuple(part.T)] = (
-                averaged_density(self._scene, self._points(part), self._num_cameras).cpu().numpy()
-            )
+            self.values[tuple(part.T)] = self._densities(self._points(part)).cpu().numpy()
             self._on_points(len(part))
         self.known[tuple(index.T)] = True
         self.num_evaluated += len(index)
@@ -260,20 +257,27 @@ class GridSampler:
             self.values[unknown] = ndimage.map_coordinates(lattice, at, order=1, mode="nearest")
 
     @torch.no_grad()
-    def rescale(self, scene: Scene, gain: Callable[[Tensor], Tensor]) -> None:
-        """Go on with a scene whose densities are those so far times `gain` of points (P, 3)."""
+    def multiply(self, gain: Callable[[Tensor], Tensor]) -> None:
+        """Multiply all densities, those evaluated so far and those to come, by `gain` of points (P, 3)."""
         index = np.argwhere(self.values > 0.0)
         for start in range(0, len(index), CHUNK):
             part = index[start : start + CHUNK]
             self.values[tuple(part.T)] *= gain(self._points(part)).cpu().numpy()
-        self._scene = scene
+        self._gains.append(gain)
+
+    def _densities(self, points: Tensor) -> Tensor:
+        """Averaged densities (P,) of points (P, 3), multiplied."""
+        densities = averaged_density(self._scene, points, self._num_cameras)
+        for gain in self._gains:
+            densities = densities * gain(points)
+        return densities
 
     @torch.no_grad()
     def density_at(self, points: np.ndarray) -> np.ndarray:
         """Averaged density (P,), 1/m, at any points (P, 3), m."""
         tensor = torch.from_numpy(points.astype(np.float32)).to(self._scene.box_min.device)
         self._on_points(len(points))
-        return averaged_density(self._scene, tensor, self._num_cameras).double().cpu().numpy()
+        return self._densities(tensor).double().cpu().numpy()
 
     def _left_out(self) -> LeftOut:
         total = int(np.prod(self.shape))

@@ -9,7 +9,7 @@ Letters: R rays, S samples on each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from charnerf.geometry.cameras import pixel_rays, project_into_all
 from charnerf.geometry.rays import box_interval, points_along
 from charnerf.meshing.density_grid import DensityGrid, densities_inside
-from charnerf.types import Cameras, DensityAnswer, FieldFunction, FieldOutput, Scene, SourceViews
+from charnerf.types import Cameras, Scene, SourceViews
 
 MASK_ALPHA = 0.5
 ABOVE = 1.1  # of the level: where the densest place of a ray is brought to; what is 0.91 times as dense is inside then
@@ -106,27 +106,3 @@ def gain_at(raised: list[RaisedRays], points: Tensor) -> Tensor:
         read = F.grid_sample(gains, at, align_corners=False, padding_mode="border")
         most = torch.maximum(most, read[0, 0, 0])
     return most
-
-
-def raised_scene(scene: Scene, raised: list[RaisedRays]) -> Scene:
-    """The scene with its densities multiplied by `gain_at`."""
-
-    def field_of(field: FieldFunction) -> FieldFunction:
-        def answer(points: Tensor, view_dirs: Tensor) -> FieldOutput:
-            found = field(points, view_dirs)
-            return FieldOutput(rgb=found.rgb, densities=found.densities * gain_at(raised, points))
-
-        return answer
-
-    def densities(points: Tensor, view_dirs: Tensor) -> DensityAnswer:
-        found = scene.answer_densities(points, view_dirs)
-        return replace(found, densities=found.densities * gain_at(raised, points))
-
-    at_width = scene.at_width
-    return replace(
-        scene,
-        coarse=field_of(scene.coarse),
-        fine=None if scene.fine is None else field_of(scene.fine),
-        densities_first=densities,
-        at_width=None if at_width is None else lambda width: raised_scene(at_width(width), raised),
-    )
