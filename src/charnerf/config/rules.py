@@ -3,17 +3,13 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from hydra.utils import get_object
+
 from charnerf.config.problems import Problems, join
 from charnerf.errors import ConfigError
 from charnerf.schedule import Phase, PhaseSchedule
 
 Rule = Callable[..., Iterator[tuple[str, str]]]
-
-HULL_FEATURES = {
-    "ImageHullFeatures": "image_hull",
-    "ImageHullSectionFeatures": "image_hull_section",
-    "ImageHullSectionConsistencyFeatures": "image_hull_section_consistency",
-}
 
 
 def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[tuple[str, str]]:
@@ -104,8 +100,9 @@ def check_ranges(plain: Any, key: str, problems: Problems) -> None:
 def idle_settings(plain: Mapping[str, Any]) -> list[str]:
     """Settings of a valid config that have no effect in its combination, each with what to do."""
     found = []
-    option = HULL_FEATURES.get(str(plain["features"]["_target_"]).rpartition(".")[2])
-    if option and not plain["model"]["hull"]:
+    features = str(plain["features"]["_target_"])
+    if get_object(features).reads_hull and not plain["model"]["hull"]:
+        option = features.split(".")[-2]  # one option, one file
         found.append(
             f"features={option} reads the hull, but model.hull=false: it reads zeros; use features=image."
         )
