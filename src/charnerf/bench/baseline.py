@@ -112,7 +112,7 @@ class PixelNeRFLike:
 
     def evaluate(self, field: Field, maps: PixelAligned, points: Tensor, view_dirs: Tensor) -> FieldOutput:
         """Colour and density of points (P, 3): every map read in every view, every linear map at every point."""
-        cameras = maps.views.cameras
+        network, cameras = self.network, maps.views.cameras
         pixels, depth, in_front = project(cameras[:, None], points[None])  # (V, P, ..)
         size = pixels.new_tensor((cameras.width, cameras.height))
         valid = (in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)).T
@@ -128,9 +128,8 @@ class PixelNeRFLike:
             source_dirs=source_dirs,
             mirrored=maps.views.mirrored.to(points.dtype),
             places=places,
-            half_lengths=half_lengths / self.network.box_half_extent,
+            half_lengths=half_lengths / network.box_half_extent,
         )
-        network = self.network
         encoded = field.single_view.locate(
             (points - network.box_centre) / network.box_half_extent, cameras.world_from_camera[:, :3, :3]
         )

@@ -15,9 +15,7 @@ from charnerf.data.surface_mesh import SurfaceMesh
 
 LOWERED = (np.radians(10.0), np.radians(80.0))  # how far arms are turned down
 _BENT = np.radians(15.0)  # standard deviation of the elbows' turns up and down
-_FORWARD = np.radians(
-    100.0
-)  # farthest that forearms are turned forward; half of them by less than a quarter of it
+_FORWARD = np.radians(100.0)  # farthest that forearms turn forward; half of them by less than a quarter of it
 _OUTER = 0.6  # share of the reach beyond which there is nothing but arm
 _THICKEST = 0.5  # largest extent in height of the outer arms, over the reach, of a T pose
 _LOWEST = 0.4  # share of the height below which no arm is level
