@@ -9,22 +9,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import torch
 from torch import Tensor
+
+Record = TypeVar("Record")
+
+
+def _mapped(record: Record, function: Callable[[Any], Any]) -> Record:
+    """The record with a function applied to its tensors, those of records in it included."""
+    changed: dict[str, Any] = {
+        field.name: function(value)
+        for field in fields(record)  # type: ignore[arg-type]
+        if isinstance(value := getattr(record, field.name), Tensor | TensorRecord)
+    }
+    return replace(record, **changed)  # type: ignore[type-var]
 
 
 class TensorRecord:
     """Moving and indexing for frozen dataclasses whose tensor fields share their leading axes."""
 
-    def _map(self, function: Any) -> Self:
-        changed: dict[str, Any] = {}
-        for field in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, field.name)
-            if isinstance(value, Tensor | TensorRecord):
-                changed[field.name] = function(value)
-        return replace(self, **changed)  # type: ignore[type-var]
+    def _map(self, function: Callable[[Any], Any]) -> Self:
+        return _mapped(self, function)
 
     def to(self, *args: Any, **kwargs: Any) -> Self:
         """Return a copy whose tensors went through `Tensor.to`; a dtype converts floating tensors only."""
@@ -38,6 +45,10 @@ class TensorRecord:
             return value.to(*args, **kwargs)
 
         return self._map(move)
+
+    def pin_memory(self) -> Self:
+        """Return a copy in page-locked memory, from where a GPU fetches while it computes."""
+        return self._map(lambda value: value.pin_memory())
 
     def __getitem__(self, index: Any) -> Self:
         """Index the shared leading axes of every tensor field."""
@@ -341,9 +352,8 @@ class TrainBatch:
 
     def to(self, device: torch.device | str, *, non_blocking: bool = False) -> TrainBatch:
         """Return a copy whose tensors are on a device."""
-        moved: dict[str, Any] = {
-            field.name: value.to(device, non_blocking=non_blocking)
-            for field in fields(self)
-            if isinstance(value := getattr(self, field.name), Tensor | TensorRecord)
-        }
-        return replace(self, **moved)
+        return _mapped(self, lambda value: value.to(device, non_blocking=non_blocking))
+
+    def pin_memory(self) -> TrainBatch:
+        """Return a copy in page-locked memory, as `TensorRecord.pin_memory`."""
+        return _mapped(self, lambda value: value.pin_memory())

@@ -63,6 +63,7 @@ class Sampling:
     num_validations: Count
     surface_delta: Annotated[float, Above(0)] | None
     memory_mib: Annotated[float, Above(0)]
+    workers: CountOrZero | None
     final_rate: Annotated[float, AtLeast(0)]
     gradient_clip: Annotated[float, Above(0)] | None
 

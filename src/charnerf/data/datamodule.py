@@ -1,17 +1,21 @@
 """The mixed ray-plus-surface datamodule."""
 
+import multiprocessing
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import lightning as L
-from torch.utils.data import DataLoader
+import torch
+from torch.utils.data import DataLoader, Dataset
 
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
-from charnerf.data.sampler import PhaseSampler
+from charnerf.data.sampler import BatchRequest, PhaseSampler
 from charnerf.data.store import CharacterStore
 from charnerf.data.validation import ValidationDataset, ValidationView
+from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.types import Hull, SourceViews, TrainBatch
 
 
@@ -26,9 +30,14 @@ class MixedDataModule(L.LightningDataModule):
         val_characters: Validation characters at most, the first of the split; None for all.
         val_views: Pictures a validation character.
         carve: The model's `carve`.
-        memory_mib: Bound on the training characters kept open.
+        memory_mib: Bound on the training characters kept open, in each worker.
+        workers: Processes that make training batches ahead of the steps, the same batches as without; None: one where a
+            GPU would wait for them, else none.
         make_dataset: Makes the training data set of a store.
         sampler: Asks for batches.
+
+    Raises:
+        ConfigError: Workers asked for where the system can not fork a process.
     """
 
     def __init__(
@@ -41,28 +50,68 @@ class MixedDataModule(L.LightningDataModule):
         val_views: int,
         carve: Callable[[SourceViews], Hull | None],
         memory_mib: float,
+        workers: int | None,
         make_dataset: Callable[[CharacterStore], MixedDataset],
         sampler: PhaseSampler,
     ) -> None:
         super().__init__()
+        if workers and not _can_fork():
+            raise ConfigError(
+                f"sampling.workers: found {workers}, but this system can not fork processes, expected 0 or null; "
+                "set sampling.workers=0."
+            )
         info = read_dataset(root)
         train = [name for split in train_splits for name in names_of(info, split)]
         val = names_of(info, val_split)[:val_characters]
         self.train_store = CharacterStore(root=root, names=train, carve=carve, memory_mib=memory_mib)
         self.val_store = CharacterStore(root=root, names=val, carve=carve, memory_mib=memory_mib)
+        self.workers = workers
         self.make_dataset = make_dataset
         self.val_views = val_views
         self.sampler = sampler
 
-    def train_dataloader(self) -> DataLoader[TrainBatch]:
+    def train_dataloader(self) -> DataLoader[TrainBatch | CharNeRFError]:
         """Batches; the sampler ends an epoch where a validation is due."""
-        dataset = self.make_dataset(self.train_store)
-        return DataLoader(dataset, sampler=self.sampler, batch_size=None, collate_fn=_as_is)
+        on_gpu = self.trainer is not None and self.trainer.strategy.root_device.type == "cuda"
+        workers = int(on_gpu and _can_fork()) if self.workers is None else self.workers
+        return DataLoader(
+            _ErrorsAsItems(self.make_dataset(self.train_store)),
+            sampler=self.sampler,
+            batch_size=None,
+            collate_fn=_as_is,
+            num_workers=workers,
+            persistent_workers=workers > 0,  # their characters stay open from one epoch to the next
+            multiprocessing_context="fork" if workers else None,
+            pin_memory=on_gpu,
+        )
 
     def val_dataloader(self) -> DataLoader[ValidationView]:
         """Pictures of the validation characters."""
         dataset = ValidationDataset(store=self.val_store, views=self.val_views)
         return DataLoader(dataset, batch_size=None, collate_fn=_as_is)
+
+    def transfer_batch_to_device(self, batch: Any, device: torch.device, dataloader_idx: int) -> Any:
+        """Move a batch, beside the GPU's work where it is pinned; raise the error that there was instead of one."""
+        if isinstance(batch, CharNeRFError):
+            raise batch
+        return batch.to(device, non_blocking=device.type == "cuda")
+
+
+@dataclass(frozen=True)
+class _ErrorsAsItems(Dataset[TrainBatch | CharNeRFError]):
+    """Batches, or errors as they are: torch would bring those of a worker as its traceback's text."""
+
+    dataset: MixedDataset
+
+    def __getitem__(self, request: BatchRequest) -> TrainBatch | CharNeRFError:  # type: ignore[override]
+        try:
+            return self.dataset[request]
+        except CharNeRFError as err:
+            return err
+
+
+def _can_fork() -> bool:
+    return "fork" in multiprocessing.get_all_start_methods()
 
 
 def _as_is(item: object) -> object:

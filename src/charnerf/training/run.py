@@ -147,6 +147,7 @@ def build_data(
         val_views=sampling.val_views,
         carve=model.carve,
         memory_mib=sampling.memory_mib,
+        workers=sampling.workers,
         make_dataset=make_dataset,
         sampler=PhaseSampler(
             schedule=build_part(cfg.schedule), position=clock.position, num_marks=sampling.num_validations
