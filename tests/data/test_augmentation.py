@@ -22,16 +22,18 @@ def carve(views):
     return build_hull(VIEWS(views), box_min=LOW, box_max=LOW + 3.6, grid_size=32)
 
 
-def surface_of(one):
-    return AreaSurface(load_surface_mesh(one.character.mesh_file))
+def surface_of(character):
+    return AreaSurface(load_surface_mesh(character.mesh_file))
 
 
 @pytest.fixture(scope="module")
 def batch(figure_dataset):
     """A character with one raised arm."""
-    store = CharacterStore(root=figure_dataset, names=("lefty",), carve=carve, memory_mib=64.0)
+    store = CharacterStore(
+        root=figure_dataset, names=("lefty",), carve=carve, memory_mib=64.0, surface_of=surface_of
+    )
     dataset = MixedDataset(
-        store=store, surface_of=surface_of, characters=1, foreground_share=0.75, space_points=200,
+        store=store, characters=1, foreground_share=0.75, space_points=200,
         reads_depth=True, used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5,
     )  # fmt: skip
     return dataset[BatchRequest(step=0, rays=64, surface_points=300, phase=0, loss_weights={})]

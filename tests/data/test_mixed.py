@@ -1,5 +1,9 @@
 """Training batches: repeatable, coloured and placed as the pictures say, nothing read in vain."""
 
+import gc
+import logging
+import re
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,21 +32,23 @@ def carve(views: SourceViews):
     return build_hull(views, box_min=low, box_max=low + 3.6, grid_size=32)
 
 
+def surface_of(character):
+    return None if character.mesh_file is None else AreaSurface(load_surface_mesh(character.mesh_file))
+
+
 def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 64.0) -> CharacterStore:
     return CharacterStore(
-        root=root, names=names, carve=carve if hull else lambda _: None, memory_mib=memory_mib
-    )
-
-
-def surface_of(one):
-    return (
-        None if one.character.mesh_file is None else AreaSurface(load_surface_mesh(one.character.mesh_file))
+        root=root,
+        names=names,
+        carve=carve if hull else lambda _: None,
+        memory_mib=memory_mib,
+        surface_of=surface_of,
     )
 
 
 def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
     settings = {
-        "surface_of": lambda one: None, "characters": 1, "foreground_share": 0.75, "space_points": 0,
+        "characters": 1, "foreground_share": 0.75, "space_points": 0,
         "reads_depth": False, "used_views": Turnaround(), "augmentation": NoAugmentation(), "seed": 5,
     }  # fmt: skip
     return MixedDataset(store=store, **settings | changes)
@@ -73,7 +79,7 @@ def same(one: TrainBatch, other: TrainBatch) -> bool:
 
 def test_the_same_request_makes_the_same_batch(figure_dataset, store):
     """Also in another process's data set, in any order; another step or seed makes another one."""
-    settings = {"surface_of": surface_of, "space_points": 20}
+    settings = {"space_points": 20}
     dataset = dataset_of(store, **settings)
     asked = request(3, surface_points=30)
     first = dataset[asked]
@@ -137,11 +143,11 @@ def test_depth_is_along_the_ray(store):
 
 
 def test_surface_points_lie_on_every_characters_surface(store):
-    batch = dataset_of(store, surface_of=surface_of, characters=2)[request(surface_points=200)]
+    batch = dataset_of(store, characters=2)[request(surface_points=200)]
     assert batch.surface.points.shape == (2, 100, 3)
     for b, name in enumerate(batch.names):
         assert helpers.signed_distances(FIGURES[name], batch.surface.points[b]).max() < 0.01
-    none = dataset_of(store, surface_of=surface_of)[request(surface_points=0)]
+    none = dataset_of(store)[request(surface_points=0)]
     assert none.surface is None
 
 
@@ -163,7 +169,7 @@ def test_every_character_gets_its_turn(store):
 def test_a_character_without_a_mesh_makes_a_batch_of_rays(tmp_path):
     helpers.write_figure(tmp_path, "bare", "train", helpers.ball(), views=2, mesh=False)
     store = store_of(tmp_path, names=("bare",))
-    batch = dataset_of(store, surface_of=surface_of)[request(surface_points=30)]
+    batch = dataset_of(store)[request(surface_points=30)]
     assert batch.surface is None and batch.alpha.numel() == 64
 
 
@@ -193,6 +199,35 @@ def test_the_store_drops_what_was_not_used_for_longest(figure_dataset):
     assert tight.open("mirror") is tight.open("mirror")
     again = tight.open("lefty")
     assert again is not first and torch.equal(again.images, first.images)
+
+
+def test_surfaces_are_dropped_with_their_characters(figure_dataset):
+    """The bound is on everything that is kept; textures are the larger part of many characters."""
+    tight = store_of(figure_dataset, memory_mib=0.001)
+    first = tight.open("lefty")
+    bare = replace(first, surface=None)
+    assert (
+        first.size_bytes - bare.size_bytes == first.surface.size_bytes > first.surface.mesh.triangles.nbytes
+    )
+    kept = weakref.ref(first.surface)
+    del first, bare
+    tight.open("mirror")
+    gc.collect()
+    assert kept() is None
+
+
+def test_too_small_a_memory_is_told_once(figure_dataset, caplog):
+    tight = store_of(figure_dataset, memory_mib=0.001)
+    with caplog.at_level(logging.WARNING, logger="charnerf"):
+        for name in NAMES * 3:
+            tight.open(name)
+    (said,) = [record.getMessage() for record in caplog.records]
+    needed = float(re.search(r"sampling\.memory_mib=(\d+) would hold all", said)[1])
+    assert "holds about 1 of 2 characters" in said
+    roomy = store_of(figure_dataset, memory_mib=needed + 1)
+    caplog.clear()
+    assert all(roomy.open(name) is roomy.open(name) for name in NAMES)
+    assert roomy.open("lefty") is roomy.open("lefty") and not caplog.records
 
 
 def test_a_character_without_a_hull_is_named(figure_dataset):

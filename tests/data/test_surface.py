@@ -109,6 +109,16 @@ def test_visible_points_leave_inner_faces_out():
     assert float(seen.min()) > 0.95
 
 
+def test_a_surface_says_what_it_keeps():
+    """The visible one keeps its pool alone, not the mesh with its textures."""
+    pixels = np.full((64, 64, 4), 255, np.uint8)
+    mesh = surface_of_scene(textured_quad(pixels))
+    floats = 64 * 64 * 4 * 4
+    assert floats + pixels.nbytes < AreaSurface(mesh).size_bytes < 4 / 3 * floats + pixels.nbytes + 4096
+    kept = VisibleSurface(nested_balls(), pool_size=1000)
+    assert kept.size_bytes == 1000 * 6 * 4
+
+
 def test_visible_points_face_outwards_and_are_even(tmp_path):
     write_surface_mesh(tmp_path / "mesh.obj", nested_balls())
     points, normals, rgb = visible_surface_points(tmp_path / "mesh.obj", 5000, 0)

@@ -13,7 +13,7 @@ from torch.utils.data import DataLoader, Dataset
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import BatchRequest, PhaseSampler
-from charnerf.data.store import CharacterStore
+from charnerf.data.store import CharacterStore, SurfaceOf
 from charnerf.data.validation import ValidationDataset, ValidationView
 from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.types import Hull, SourceViews, TrainBatch
@@ -33,6 +33,7 @@ class MixedDataModule(L.LightningDataModule):
         memory_mib: Bound on the training characters kept open, in each worker.
         workers: Processes that make training batches ahead of the steps, the same batches as without; None: one where a
             GPU would wait for them, else none.
+        surface_of: Makes a training character's surface.
         make_dataset: Makes the training data set of a store.
         sampler: Asks for batches.
 
@@ -51,6 +52,7 @@ class MixedDataModule(L.LightningDataModule):
         carve: Callable[[SourceViews], Hull | None],
         memory_mib: float,
         workers: int | None,
+        surface_of: SurfaceOf,
         make_dataset: Callable[[CharacterStore], MixedDataset],
         sampler: PhaseSampler,
     ) -> None:
@@ -63,7 +65,9 @@ class MixedDataModule(L.LightningDataModule):
         info = read_dataset(root)
         train = [name for split in train_splits for name in names_of(info, split)]
         val = names_of(info, val_split)[:val_characters]
-        self.train_store = CharacterStore(root=root, names=train, carve=carve, memory_mib=memory_mib)
+        self.train_store = CharacterStore(
+            root=root, names=train, carve=carve, memory_mib=memory_mib, surface_of=surface_of
+        )
         self.val_store = CharacterStore(root=root, names=val, carve=carve, memory_mib=memory_mib)
         self.workers = workers
         self.make_dataset = make_dataset

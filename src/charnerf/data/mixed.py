@@ -1,7 +1,7 @@
 """Training batches: target rays and surface points of a few characters, drawn from the step's own seed."""
 
 from collections.abc import Callable
-from typing import Protocol, final
+from typing import final
 
 import torch
 from torch import Tensor
@@ -11,20 +11,10 @@ from charnerf.data.augmentation import AbstractAugmentation
 from charnerf.data.sampler import BatchRequest, step_seed
 from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
+from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_rays
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, SpacePoints, SurfacePoints, TrainBatch
-
-
-class Surface(Protocol):
-    """A surface that points can be drawn from (data/surface.py has two)."""
-
-    def sample(self, num_points: int, generator: torch.Generator) -> SurfacePoints:
-        """Draw points, B = 1."""
-        ...
-
-
-SurfaceOf = Callable[[OpenCharacter], Surface | None]
 
 
 @final
@@ -33,7 +23,6 @@ class MixedDataset(Dataset[TrainBatch]):
 
     Args:
         store: The characters.
-        surface_of: A character's surface, None where no loss reads it or there is no mesh.
         characters: B, characters a step.
         foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white;
             the rest is drawn from pixels beside it whose rays may meet the hull.
@@ -48,7 +37,6 @@ class MixedDataset(Dataset[TrainBatch]):
         self,
         *,
         store: CharacterStore,
-        surface_of: SurfaceOf,
         characters: int,
         foreground_share: float,
         space_points: int,
@@ -58,7 +46,6 @@ class MixedDataset(Dataset[TrainBatch]):
         seed: int,
     ) -> None:
         self.store = store
-        self.surface_of = surface_of
         self.characters = min(characters, len(store))
         self.foreground_share = foreground_share
         self.space_points = space_points
@@ -75,7 +62,7 @@ class MixedDataset(Dataset[TrainBatch]):
         rays = _shares(request.rays, len(opened))
         drawn = [self._rays(one, rays, generator) for one in opened]
         points = _shares(request.surface_points, len(opened))
-        surfaces = [self.surface_of(one) for one in opened]
+        surfaces = [one.surface for one in opened]
         surface = _sample_surfaces(surfaces, points, generator) if points else None
         space = self._space(opened, generator)
         views = stack_views([one.character.sources for one in opened])
@@ -192,7 +179,7 @@ def _shares(total: int, parts: int) -> int:
 
 
 def _sample_surfaces(
-    surfaces: list[Surface | None], num_points: int, generator: torch.Generator
+    surfaces: list[AbstractSurface | None], num_points: int, generator: torch.Generator
 ) -> SurfacePoints | None:
     """Points on every character's surface; None if one has no mesh (rays alone then)."""
     if any(surface is None for surface in surfaces):

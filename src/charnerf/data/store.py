@@ -1,18 +1,23 @@
 """Characters in memory, opened when first asked for, within a memory bound."""
 
+import logging
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import final
 
 import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
+from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
 from charnerf.geometry.silhouettes import hull_silhouettes
 from charnerf.types import Hull, SourceViews
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,7 @@ class OpenCharacter:
         hull: Hull of its drawings (B = 1), None for a model without.
         foreground: Flat indices into (N, H, W) of pixels that show the character, int32.
         background: Those of the other pixels whose rays may meet the hull, int32: of the rest there is nothing to learn.
+        surface: What surface points are drawn from, None where nothing reads them or there is no mesh.
     """
 
     character: Character
@@ -32,12 +38,21 @@ class OpenCharacter:
     hull: Hull | None
     foreground: Tensor
     background: Tensor
+    surface: AbstractSurface | None
 
     @property
     def size_bytes(self) -> int:
         """Memory of the tensors."""
         hull = 0 if self.hull is None else self.hull.occupancy.numel() + 8 * self.hull.front_depths.numel()
-        return self.images.numel() + 4 * (self.foreground.numel() + self.background.numel()) + hull
+        surface = 0 if self.surface is None else self.surface.size_bytes
+        return self.images.numel() + 4 * (self.foreground.numel() + self.background.numel()) + hull + surface
+
+
+SurfaceOf = Callable[[Character], AbstractSurface | None]
+
+
+def no_surface(character: Character) -> None:
+    """Of no character: where nothing reads surface points."""
 
 
 @final
@@ -49,6 +64,7 @@ class CharacterStore:
         names: Characters.
         carve: Makes the hull of drawings (the model's `carve`).
         memory_mib: Bound, MiB; at least one character is always kept.
+        surface_of: Makes a character's surface.
     """
 
     def __init__(
@@ -58,13 +74,18 @@ class CharacterStore:
         names: Sequence[str],
         carve: Callable[[SourceViews], Hull | None],
         memory_mib: float,
+        surface_of: SurfaceOf = no_surface,
     ) -> None:
         self.root = root
         self.names = tuple(names)
         self.carve = carve
         self.memory_bytes = memory_mib * 2**20
+        self.surface_of = surface_of
         self._open: OrderedDict[str, OpenCharacter] = OrderedDict()
         self._used_bytes = 0
+        self._seconds = 0.0
+        self._num_openings = 0
+        self._told = False
 
     def __len__(self) -> int:
         """Number of characters."""
@@ -76,6 +97,7 @@ class CharacterStore:
         if found is not None:
             self._open.move_to_end(name)
             return found
+        start = perf_counter()
         character = load_character(self.root, name)
         images = character.images(range(len(character.image_files)))
         try:
@@ -86,10 +108,26 @@ class CharacterStore:
         foreground = shown.reshape(-1).nonzero()[:, 0].to(torch.int32)
         near = ~shown if hull is None else hull_silhouettes(hull[0], character.cameras) & ~shown
         background = near.reshape(-1).nonzero()[:, 0].to(torch.int32)
-        opened = OpenCharacter(character, images, hull, foreground, background)
+        surface = self.surface_of(character)
+        opened = OpenCharacter(character, images, hull, foreground, background, surface)
+        self._seconds += perf_counter() - start
+        self._num_openings += 1
         self._open[name] = opened
         self._used_bytes += opened.size_bytes
+        if self._used_bytes > self.memory_bytes and not self._told:
+            self._tell()
         while self._used_bytes > self.memory_bytes and len(self._open) > 1:
             _, dropped = self._open.popitem(last=False)
             self._used_bytes -= dropped.size_bytes
         return opened
+
+    def _tell(self) -> None:
+        """Say once that characters are opened again and again, and what that costs."""
+        self._told = True
+        held, wanted = max(len(self._open) - 1, 1), len(set(self.names))
+        needed = self._used_bytes / len(self._open) * wanted / 2**20
+        log.warning(
+            "sampling.memory_mib=%.0f holds about %d of %d characters; the others are opened anew at each turn, %.2f s each. "
+            "sampling.memory_mib=%.0f would hold all; sampling.workers=1 opens them beside the training.",
+            self.memory_bytes / 2**20, held, wanted, self._seconds / self._num_openings, 1.05 * needed,
+        )  # fmt: skip

@@ -7,7 +7,6 @@ from typing import final
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from charnerf.data.color import srgb_from_linear
 from charnerf.data.mesh_files import load_surface_mesh
@@ -35,6 +34,11 @@ class AbstractSurface(ABC):
         Returns:
             Points with B = 1, float32.
         """
+
+    @property
+    @abstractmethod
+    def size_bytes(self) -> int:
+        """Memory of what is kept to draw from."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,11 @@ class AreaSurface(AbstractSurface):
         points = interpolate(self.mesh.triangles[draw.triangles], draw.u, draw.v)
         return _surface_points(points, srgb_from_linear(draw.rgb))
 
+    @property
+    def size_bytes(self) -> int:
+        """Memory of the mesh and its textures."""
+        return self.mesh.size_bytes + self._cumulated.nbytes
+
     def draw(self, num_points: int, generator: torch.Generator) -> _Draw:
         """Draw points by area as triangles and weights; parts that alpha cuts out are drawn again.
 
@@ -105,23 +114,25 @@ class VisibleSurface(AbstractSurface):
     Args:
         mesh: The surface.
         cameras: Cameras (N,) that look at it; None for a capture's usual ones.
-        pool_size: Points in the pool, which is made at the first draw.
+        pool_size: Points in the pool.
+
+    Raises:
+        DataError: If the cameras see none of it.
     """
 
     def __init__(self, mesh: SurfaceMesh, cameras: Cameras | None = None, *, pool_size: int = 32768):
-        self._area = AreaSurface(mesh)
-        self._cameras = cameras
-        self._pool_size = pool_size
-        self._pool: tuple[Tensor, Tensor] | None = None
+        points, _, draw = _visible(AreaSurface(mesh), cameras, pool_size, seed=0)
+        self._pool = _surface_points(points, srgb_from_linear(draw.rgb))
 
     def sample(self, num_points: int, generator: torch.Generator) -> SurfacePoints:
         """Draw points of the pool, with replacement; see `AbstractSurface.sample`."""
-        if self._pool is None:
-            points, _, draw = _visible(self._area, self._cameras, self._pool_size, seed=0)
-            pool = _surface_points(points, srgb_from_linear(draw.rgb))
-            self._pool = (pool.points[0], pool.rgb[0])
-        chosen = torch.randint(len(self._pool[0]), (num_points,), generator=generator)
-        return SurfacePoints(points=self._pool[0][chosen][None], rgb=self._pool[1][chosen][None])
+        chosen = torch.randint(self._pool.points.shape[1], (num_points,), generator=generator)
+        return self._pool[:, chosen]
+
+    @property
+    def size_bytes(self) -> int:
+        """Memory of the pool; the mesh is not kept."""
+        return self._pool.points.nbytes + self._pool.rgb.nbytes
 
 
 def visible_surface_points(

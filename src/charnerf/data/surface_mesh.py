@@ -60,6 +60,15 @@ class SurfaceMesh:
     materials: tuple[SurfaceMaterial, ...]
 
     @property
+    def size_bytes(self) -> int:
+        """Memory of triangles and textures."""
+        arrays = [self.triangles, self.uvs, self.colors, self.material_ids]
+        for material in self.materials:
+            if material.texture is not None:
+                arrays += [material.texture.pixels, *material.texture.levels]
+        return sum(array.nbytes for array in arrays)
+
+    @property
     def has_cutouts(self) -> bool:
         """Whether a part of the surface may be cut out by alpha."""
         return any(material.cutoff is not None for material in self.materials)

@@ -5,7 +5,6 @@ import logging
 import warnings
 from collections.abc import Callable
 from datetime import timedelta
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +14,13 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard.summary import hparams
 
-from charnerf.data.characters import load_character
+from charnerf.data.characters import Character, load_character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.layout import names_of, read_dataset
-from charnerf.data.mixed import MixedDataset, SurfaceOf
+from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import PhaseSampler
-from charnerf.data.store import CharacterStore, OpenCharacter
-from charnerf.data.surface import load_surface_mesh
+from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
+from charnerf.data.surface import AbstractSurface, load_surface_mesh
 from charnerf.errors import ConfigError
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
@@ -124,12 +123,10 @@ def build_data(
 ) -> MixedDataModule:
     """The datamodule; what no loss reads is not opened."""
     sampling = cfg.sampling
-    surface_of = _surface_of(cfg, losses)
 
     def make_dataset(store: CharacterStore) -> MixedDataset:
         return MixedDataset(
             store=store,
-            surface_of=surface_of,
             characters=cfg.scale.batch_characters,
             foreground_share=sampling.foreground_share,
             space_points=sampling.space_points if reads(cfg, losses, "occupancy") else 0,
@@ -148,6 +145,7 @@ def build_data(
         carve=model.carve,
         memory_mib=sampling.memory_mib,
         workers=sampling.workers,
+        surface_of=_surface_of(cfg, losses),
         make_dataset=make_dataset,
         sampler=PhaseSampler(
             schedule=build_part(cfg.schedule), position=clock.position, num_marks=sampling.num_validations
@@ -162,24 +160,19 @@ def reads(cfg: DictConfig, losses: WeightedLosses, *terms: str) -> bool:
 
 
 def _surface_of(cfg: DictConfig, losses: WeightedLosses) -> SurfaceOf:
-    """A character's surface, opened once; None without a loss that reads it or without a mesh, which is said once."""
-    make_surface: Callable[..., Any] = build_part(cfg.surface)
-    read = reads(cfg, losses, *SURFACE_TERMS)
+    """Opens a character's surface; None without a loss that reads it or without a mesh, which is said once."""
+    if not reads(cfg, losses, *SURFACE_TERMS):
+        return no_surface
+    make_surface: Callable[..., AbstractSurface] = build_part(cfg.surface)
     told: set[str] = set()
 
-    @cache
-    def opened(path: Path) -> Any:
-        return make_surface(load_surface_mesh(path))
-
-    def surface_of(one: OpenCharacter) -> Any:
-        if not read:
-            return None
-        if one.character.mesh_file is None:
+    def surface_of(character: Character) -> AbstractSurface | None:
+        if character.mesh_file is None:
             if not told:
-                log.warning("Character %s has no mesh: it is trained by rays alone.", one.character.name)
-                told.add(one.character.name)
+                log.warning("Character %s has no mesh: it is trained by rays alone.", character.name)
+                told.add(character.name)
             return None
-        return opened(one.character.mesh_file)
+        return make_surface(load_surface_mesh(character.mesh_file))
 
     return surface_of
 
