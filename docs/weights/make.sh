@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The recipe of the next weights, on a CPU or on a GPU where there is one: data, training, figures.
 #   docs/weights/make.sh FOLDER [more overrides of train.py]
-# FOLDER/meshes/{train,train_extra,val,test} hold the mesh files of docs/characters.md without those of quaternius-ultimate, whose skin
+# FOLDER/meshes/{train,train_extra,more,val,test} hold the mesh files of docs/characters.md without those of quaternius-ultimate, whose skin
 # is black by a fault of their export: these lie in FOLDER/meshes/ultimate and get skin colours here. Each step goes on where it was
 # interrupted; a data set that is there is not made again. A GPU has room for `scale=base trainer=gpu`.
 set -euo pipefail
@@ -51,16 +51,17 @@ fi
 capture train train
 capture train_extra train_extra
 capture chibi chibi
+capture more more
 capture val val
 capture test test
-capture variants "train train_extra chibi" --views 24 --variants 3 --seed 1
-capture swaps "train train_extra chibi" --views 24 --swaps 6 --seed 1
+capture variants "train train_extra chibi more" --views 24 --variants 3 --seed 1
+capture swaps "train train_extra chibi more" --views 24 --swaps 6 --seed 1
 
 run="$folder/run"
 resume=()
 [ -e "$run/checkpoints/last.ckpt" ] && resume=("ckpt_path=$run/checkpoints/last.ckpt")
 python train.py data=folder "data.root=$data" \
-  'sampling.train_splits=[train,train_extra,chibi,train,train_extra,chibi,variants,swaps,embedded]' \
+  'sampling.train_splits=[train,train_extra,chibi,train,train_extra,chibi,more,more,more,variants,swaps,embedded]' \
   features=image_hull_section_consistency encoder.coarse_width=64 encoder.coarse_channels=64 augmentation=stretch_recolor \
   augmentation.recolor_share=0.7 augmentation.stretch_share=0.8 averaging.decay=0.998 sampling.foreground_share=0.65 \
   budget.seconds=3960 sampling.memory_mib=16000 \
