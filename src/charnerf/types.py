@@ -9,29 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import torch
 from torch import Tensor
 
-Record = TypeVar("Record")
 
-
-def _mapped(record: Record, function: Callable[[Any], Any]) -> Record:
-    """The record with a function applied to its tensors, those of records in it included."""
-    changed: dict[str, Any] = {
-        field.name: function(value)
-        for field in fields(record)  # type: ignore[arg-type]
-        if isinstance(value := getattr(record, field.name), Tensor | TensorRecord)
-    }
-    return replace(record, **changed)  # type: ignore[type-var]
-
-
-class TensorRecord:
-    """Moving and indexing for frozen dataclasses whose tensor fields share their leading axes."""
+class MovableRecord:
+    """Moving for frozen dataclasses with tensor fields; records among the fields move along."""
 
     def _map(self, function: Callable[[Any], Any]) -> Self:
-        return _mapped(self, function)
+        changed: dict[str, Any] = {
+            field.name: function(value)
+            for field in fields(self)  # type: ignore[arg-type]
+            if isinstance(value := getattr(self, field.name), Tensor | MovableRecord)
+        }
+        return replace(self, **changed)  # type: ignore[type-var]
 
     def to(self, *args: Any, **kwargs: Any) -> Self:
         """Return a copy whose tensors went through `Tensor.to`; a dtype converts floating tensors only."""
@@ -49,6 +42,10 @@ class TensorRecord:
     def pin_memory(self) -> Self:
         """Return a copy in page-locked memory, from where a GPU fetches while it computes."""
         return self._map(lambda value: value.pin_memory())
+
+
+class TensorRecord(MovableRecord):
+    """Moving and indexing for frozen dataclasses whose tensor fields share their leading axes."""
 
     def __getitem__(self, index: Any) -> Self:
         """Index the shared leading axes of every tensor field."""
@@ -317,7 +314,7 @@ class Rendering:
 
 
 @dataclass(frozen=True)
-class TrainBatch:
+class TrainBatch(MovableRecord):
     """One training step's material.
 
     Attributes:
@@ -349,11 +346,3 @@ class TrainBatch:
     phase: int
     loss_weights: Mapping[str, float]
     step: int
-
-    def to(self, device: torch.device | str, *, non_blocking: bool = False) -> TrainBatch:
-        """Return a copy whose tensors are on a device."""
-        return _mapped(self, lambda value: value.to(device, non_blocking=non_blocking))
-
-    def pin_memory(self) -> TrainBatch:
-        """Return a copy in page-locked memory, as `TensorRecord.pin_memory`."""
-        return _mapped(self, lambda value: value.pin_memory())
