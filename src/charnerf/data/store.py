@@ -84,7 +84,6 @@ class CharacterStore:
         self._open: OrderedDict[str, OpenCharacter] = OrderedDict()
         self._used_bytes = 0
         self._seconds = 0.0
-        self._num_openings = 0
         self._told = False
 
     def __len__(self) -> int:
@@ -111,7 +110,6 @@ class CharacterStore:
         surface = self.surface_of(character)
         opened = OpenCharacter(character, images, hull, foreground, background, surface)
         self._seconds += perf_counter() - start
-        self._num_openings += 1
         self._open[name] = opened
         self._used_bytes += opened.size_bytes
         if self._used_bytes > self.memory_bytes and not self._told:
@@ -122,12 +120,12 @@ class CharacterStore:
         return opened
 
     def _tell(self) -> None:
-        """Say once that characters are opened again and again, and what that costs."""
+        """Say once, when the first is about to be dropped, that characters are opened again and again, and what that costs."""
         self._told = True
-        held, wanted = max(len(self._open) - 1, 1), len(set(self.names))
-        needed = self._used_bytes / len(self._open) * wanted / 2**20
+        opened, wanted = len(self._open), len(set(self.names))
+        needed = self._used_bytes / opened * wanted / 2**20
         log.warning(
             "sampling.memory_mib=%.0f holds about %d of %d characters; the others are opened anew at each turn, %.2f s each. "
             "sampling.memory_mib=%.0f would hold all; sampling.workers=1 opens them beside the training.",
-            self.memory_bytes / 2**20, held, wanted, self._seconds / self._num_openings, 1.05 * needed,
+            self.memory_bytes / 2**20, max(opened - 1, 1), wanted, self._seconds / opened, 1.05 * needed,
         )  # fmt: skip
