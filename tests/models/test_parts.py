@@ -44,6 +44,7 @@ def point_inputs(num_points: int = 9, num_views: int = 3, *, extras: int = 0) ->
         encoded_points=random(num_points, 6 * tiny_models.FREQUENCIES),
         view_dirs=safe_normalize(random(num_points, 3)),
         source_dirs=safe_normalize(random(num_points, num_views, 3)),
+        kept=torch.ones(num_points, dtype=torch.float64),
     )
 
 

@@ -31,6 +31,7 @@ def inputs_of(
         encoded_points=f1.locate(points, rotations),
         view_dirs=view_dirs,
         source_dirs=random(count, views, 3),
+        kept=torch.ones(count, dtype=torch.float64),
     )
 
 

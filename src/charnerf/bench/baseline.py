@@ -118,6 +118,7 @@ class PixelNeRFLike:
         valid = (in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)).T
         latents = field.from_latents(_read(maps.feature_maps, pixels / size)) * valid[..., None]
         source_rgb = _read(maps.pictures, pixels / size)
+        kept = self._kept(maps, pixels / size)
         behind, edge = self._read_hull(maps, pixels / size, depth.T, points)
         source_dirs = directions_to_points(cameras, points)
         places, half_lengths = self._read_sections(maps, points)
@@ -144,8 +145,16 @@ class PixelNeRFLike:
                 encoded_points=encoded,
                 view_dirs=view_dirs,
                 source_dirs=source_dirs,
+                kept=kept,
             )
         )
+
+    def _kept(self, maps: PixelAligned, shares: Tensor) -> Tensor:
+        """As the model keeps densities, (P,); drawings that disagree are not widened here."""
+        if maps.hull is None:
+            return torch.ones_like(shares[0, :, 0])
+        coverage = _read(maps.views.images[:, 3:], shares)[..., 0]
+        return (2.0 * coverage[:, ~maps.views.mirrored].amin(-1)).clamp_max(1.0)
 
     def _read_sections(self, maps: PixelAligned, points: Tensor) -> tuple[Tensor, Tensor]:
         if maps.sections is None:

@@ -201,9 +201,11 @@ class CharNeRF(nn.Module):
         sight = maps.look(points, latents)
         if sight.front is None or sight.edge is None:
             behind = edge = torch.zeros_like(sight.along_ray)
+            kept = torch.ones_like(points[:, 0])
         else:
             behind = (sight.along_ray - sight.front) / self.box_half_extent
             edge = sight.edge / maps.cameras.width
+            kept = maps.kept(sight.coverage)
         places, half_lengths = maps.places(points)
         readings = ViewReadings(
             source_rgb=sight.rgb,
@@ -227,6 +229,7 @@ class CharNeRF(nn.Module):
             ),
             view_dirs=view_dirs,
             source_dirs=sight.source_dirs,
+            kept=kept,
         )
 
 

@@ -57,7 +57,7 @@ class Field(nn.Module):
         """Colours (P, 3) and densities (P,) of points as the views see them; latents come through `from_latents`."""
         trunk = self.density(inputs, self.single_view, self.combinator, self.multi_view)
         rgb = self.head(trunk.features, trunk.view_features, inputs)
-        return FieldOutput(rgb=rgb, densities=self.activation(trunk.raw_densities))
+        return FieldOutput(rgb=rgb, densities=self.activation(trunk.raw_densities) * inputs.kept)
 
     def densities(self, inputs: PointInputs, coloured: Callable[[PointInputs], PointInputs]) -> DensityAnswer:
         """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps.
@@ -70,7 +70,7 @@ class Field(nn.Module):
         # what only the trunk reads need not be kept
         seen = replace(inputs, latents=inputs.latents[..., :0], extras=inputs.extras[..., :0])
         return DensityAnswer(
-            densities=self.activation(trunk.raw_densities),
+            densities=self.activation(trunk.raw_densities) * inputs.kept,
             state=_Half(trunk, seen),
             colours=lambda half: self._colours(half.trunk, coloured(half.inputs)),
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from charnerf.geometry.cameras import directions_to_points, project_into_all
 from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
@@ -24,6 +25,7 @@ class Sight:
     Attributes:
         latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
         rgb: (P, V, 3), colour of the drawings.
+        coverage: (P, V), alpha of the drawings, as widened as their hull; 1 behind a camera.
         shares: (P, V, 2), where they project, in shares of the pictures' sides.
         front: (P, V), m, distance of the hull's front along the view's ray.
         edge: (P, V), pixels, distance from the mask's edge.
@@ -34,6 +36,7 @@ class Sight:
 
     latents: Tensor
     rgb: Tensor
+    coverage: Tensor
     shares: Tensor
     front: Tensor | None
     edge: Tensor | None
@@ -50,8 +53,9 @@ class ViewMaps:
         cameras: (V,).
         parallel: Whether every camera is orthographic: no perspective division, one direction a view.
         map_size: Width and height of the feature maps.
-        pictures: Rows (V * H * W, 3), or (V * H * W, 5) where the hull's maps have the pictures' size and
-            lie beside the colours.
+        pictures: Rows (V * H * W, 4) of colour and coverage, or (V * H * W, 6) where the hull's maps have the pictures' size and
+            lie beside them.
+        carving: Indices of the views whose silhouettes carve: mirrored ones do not.
         hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
             without a hull or where
             they lie beside the colours.
@@ -63,6 +67,7 @@ class ViewMaps:
     parallel: bool
     map_size: tuple[int, int]
     pictures: Tensor
+    carving: Tensor
     hull_rows: Tensor | None
     hull_size: tuple[int, int]
     sections: CrossSections | None
@@ -86,7 +91,9 @@ class ViewMaps:
             map_size: Width and height of the feature maps.
             sections: Whether to measure the hull's cross-sections.
         """
-        pictures, rows, size = on_white(views.images), None, (0, 0)
+        dilations = None if hull is None else hull.dilations[present]
+        pictures = torch.cat((on_white(views.images), _coverage(views.images[:, 3:], dilations)), dim=1)
+        rows, size = None, (0, 0)
         if hull is not None:
             maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
             size = (maps.shape[-1], maps.shape[-2])
@@ -99,6 +106,7 @@ class ViewMaps:
             parallel=bool(views.cameras.orthographic.all()),
             map_size=map_size,
             pictures=maps_to_rows(pictures),
+            carving=(~views.mirrored).nonzero()[:, 0],
             hull_rows=rows,
             hull_size=size,
             sections=cross_sections(hull) if sections and hull is not None else None,
@@ -122,6 +130,7 @@ class ViewMaps:
         return Sight(
             latents=read.unflatten(0, leading),
             rgb=seen[..., :3],
+            coverage=torch.where(in_front, seen[..., 3], 1.0),
             shares=shares,
             front=front,
             edge=edge,
@@ -129,6 +138,14 @@ class ViewMaps:
             source_dirs=directions,
             valid=valid,
         )
+
+    def kept(self, coverage: Tensor) -> Tensor:
+        """How much of the densities of points (P,) the drawings leave, by their coverage (P, V) there.
+
+        All of it inside of every outline, where pixels are covered by half or more; nothing where a drawing shows nothing at all.
+        The hull, widened so that no surface is cut away, leaves room for figures to grow fat: a smooth field does.
+        """
+        return (2.0 * coverage[:, self.carving].amin(-1)).clamp_max(1.0)
 
     def places(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Places of points (P, 3) in the hull's runs and the runs' half-lengths, (P, 3) each; zeros if they are not read."""
@@ -139,8 +156,8 @@ class ViewMaps:
 
     def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
-        if seen.shape[-1] > 3:
-            return seen[..., 3], seen[..., 4]
+        if seen.shape[-1] > 4:
+            return seen[..., 4], seen[..., 5]
         if self.hull_rows is None:
             return None, None
         width, height = self.hull_size
@@ -184,6 +201,17 @@ class Pictures:
         width, height = self.size
         own = bilinear_rows(shares * shares.new_tensor(self.size), width=width, height=height)
         return read_rows(self.rows, *own).unflatten(0, shares.shape[:2])
+
+
+def _coverage(alphas: Tensor, dilations: Tensor | None) -> Tensor:
+    """Alphas (V, 1, H, W), those of drawings that disagree widened as the hull was, by its dilations (V,) beyond one pixel."""
+    if dilations is None or not bool((dilations > 1.0).any()):
+        return alphas
+    widened = [
+        F.max_pool2d(alpha, 2 * reach + 1, stride=1, padding=reach)
+        for alpha, reach in zip(alphas, (dilations - 1.0).ceil().int().tolist(), strict=True)
+    ]
+    return torch.stack(widened)
 
 
 def on_white(images: Tensor) -> Tensor:
