@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from torch.nn import functional as F
 
 import helpers
 import tiny_models
@@ -151,6 +152,31 @@ def test_a_model_without_hull_carves_nothing(person_views):
     assert model.carve(person_views) is None
     encoded = model.encode(person_views)
     assert encoded.hull is None and model.scene(encoded, 0).hull is None
+
+
+def coverage_at(views: SourceViews, points: torch.Tensor) -> torch.Tensor:
+    """Alpha of the drawings at points (P, 3), the least of all views, by PyTorch's own reading."""
+    cameras = views.cameras[0]
+    pixels, _, _ = project_into_all(cameras, points)
+    grid = (2.0 * pixels / cameras.width - 1.0).transpose(0, 1)[:, :, None]
+    return F.grid_sample(views.images[0, :, 3:], grid, padding_mode="border", align_corners=False)[
+        :, 0, :, 0
+    ].amin(0)
+
+
+def test_density_ends_at_the_outlines(person_views):
+    """A softplus is positive everywhere; where a drawing shows nothing, nothing is left of it. A mirrored view has no say."""
+    model = tiny_models.shake(tiny_models.tiny_model(views="mirrored"))
+    points = some_points(2000)
+    covered = coverage_at(person_views, points)
+    densities = ask(model, person_views, points).densities
+    assert bool((densities[covered == 0.0] == 0.0).all()) and bool((covered == 0.0).any())
+    assert bool((densities[covered >= 0.5] > 0.0).all()) and bool((covered >= 0.5).any())
+
+
+def test_a_model_without_hull_asks_no_outline(person_views):
+    model = tiny_models.shake(tiny_models.tiny_model(hull=False))
+    assert bool((ask(model, person_views, some_points()).densities > 0.0).all())
 
 
 def test_encoding_is_a_value_not_a_state(person_views):
