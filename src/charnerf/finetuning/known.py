@@ -189,5 +189,4 @@ def answer_known(field: Field, rows: _Rows) -> FieldOutput:
         return rows.view_features
 
     trunk = field.density(rows.inputs, remembered, field.combinator, field.multi_view)
-    rgb = field.head(trunk.features, trunk.view_features, rows.inputs)
-    return FieldOutput(rgb=rgb, densities=field.activation(trunk.raw_densities))
+    return field.answer(trunk, rows.inputs)

@@ -56,8 +56,12 @@ class Field(nn.Module):
     def forward(self, inputs: PointInputs) -> FieldOutput:
         """Colours (P, 3) and densities (P,) of points as the views see them; latents come through `from_latents`."""
         trunk = self.density(inputs, self.single_view, self.combinator, self.multi_view)
+        return self.answer(trunk, inputs)
+
+    def answer(self, trunk: TrunkOutput, inputs: PointInputs) -> FieldOutput:
+        """Colours (P, 3) and densities (P,) of points whose trunk is known, with the query direction in it."""
         rgb = self.head(trunk.features, trunk.view_features, inputs)
-        return FieldOutput(rgb=rgb, densities=self.activation(trunk.raw_densities) * inputs.kept)
+        return FieldOutput(rgb=rgb, densities=self._kept_densities(trunk, inputs))
 
     def densities(self, inputs: PointInputs, coloured: Callable[[PointInputs], PointInputs]) -> DensityAnswer:
         """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps.
@@ -70,10 +74,14 @@ class Field(nn.Module):
         # what only the trunk reads need not be kept
         seen = replace(inputs, latents=inputs.latents[..., :0], extras=inputs.extras[..., :0])
         return DensityAnswer(
-            densities=self.activation(trunk.raw_densities) * inputs.kept,
+            densities=self._kept_densities(trunk, inputs),
             state=_Half(trunk, seen),
             colours=lambda half: self._colours(half.trunk, coloured(half.inputs)),
         )
+
+    def _kept_densities(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
+        densities: Tensor = self.activation(trunk.raw_densities) * inputs.kept
+        return densities
 
     def _colours(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
         features = self.density.directed(trunk, inputs, self.combinator)
