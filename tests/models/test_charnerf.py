@@ -166,12 +166,15 @@ def coverage_at(views: SourceViews, points: torch.Tensor) -> torch.Tensor:
 
 def test_density_ends_at_the_outlines(person_views):
     """A softplus is positive everywhere; where a drawing shows nothing, nothing is left of it. A mirrored view has no say."""
-    model = tiny_models.shake(tiny_models.tiny_model(views="mirrored"))
+    model = tiny_models.shake(tiny_models.tiny_model(views="mirrored")).eval()
     points = some_points(2000)
     covered = coverage_at(person_views, points)
     densities = ask(model, person_views, points).densities
     assert bool((densities[covered == 0.0] == 0.0).all()) and bool((covered == 0.0).any())
     assert bool((densities[covered >= 0.5] > 0.0).all()) and bool((covered >= 0.5).any())
+    assert bool(
+        (ask(model.train(), person_views, points).densities > 0.0).all()
+    )  # what trains learns them itself
 
 
 def test_a_model_without_hull_asks_no_outline(person_views):

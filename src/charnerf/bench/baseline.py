@@ -151,7 +151,7 @@ class PixelNeRFLike:
 
     def _kept(self, maps: PixelAligned, shares: Tensor) -> Tensor:
         """As the model keeps densities, (P,); drawings that disagree are not widened here."""
-        if maps.hull is None:
+        if maps.hull is None or self.network.training:
             return torch.ones_like(shares[0, :, 0])
         coverage = _read(maps.views.images[:, 3:], shares)[..., 0]
         return (2.0 * coverage[:, ~maps.views.mirrored].amin(-1)).clamp_max(1.0)

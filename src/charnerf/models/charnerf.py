@@ -201,11 +201,12 @@ class CharNeRF(nn.Module):
         sight = maps.look(points, latents)
         if sight.front is None or sight.edge is None:
             behind = edge = torch.zeros_like(sight.along_ray)
-            kept = torch.ones_like(points[:, 0])
         else:
             behind = (sight.along_ray - sight.front) / self.box_half_extent
             edge = sight.edge / maps.cameras.width
-            kept = maps.kept(sight.coverage)
+        # in training the field has to learn the outlines by itself: relying on this it learned less of everything
+        ends = self.has_hull and not self.training
+        kept = maps.kept(sight.coverage) if ends else torch.ones_like(points[:, 0])
         places, half_lengths = maps.places(points)
         readings = ViewReadings(
             source_rgb=sight.rgb,

@@ -21,7 +21,8 @@ class PointInputs(TensorRecord):
         encoded_points: (P, C) or (P, V, C), where the points lie, as f1 encodes it.
         view_dirs: (P, 3), unit query directions, or zero for "no direction".
         source_dirs: (P, V, 3), unit, from each source camera to the point.
-        kept: (P,) in [0, 1], factor on the density: 0 where a drawing shows that nothing is there; 1 without a hull.
+        kept: (P,) in [0, 1], factor on the density: 0 where a drawing shows that nothing is there; 1 without a hull and in
+            training.
     """
 
     latents: Tensor
