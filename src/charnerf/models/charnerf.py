@@ -204,7 +204,7 @@ class CharNeRF(nn.Module):
         else:
             behind = (sight.along_ray - sight.front) / self.box_half_extent
             edge = sight.edge / maps.cameras.width
-        # in training the field has to learn the outlines by itself: relying on this it learned less of everything
+        # in training the field learns the outlines by itself: with this it came to 0.2 dB less foreground (docs/ablations.md)
         ends = self.has_hull and not self.training
         kept = maps.kept(sight.coverage) if ends else torch.ones_like(points[:, 0])
         places, half_lengths = maps.places(points)
