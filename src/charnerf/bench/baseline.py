@@ -25,7 +25,7 @@ from charnerf.models.charnerf import HULL_DEPTH_FADE, CharNeRF, EncodedViews
 from charnerf.models.features.base import ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
-from charnerf.models.view_maps import on_white
+from charnerf.models.view_maps import kept_share, on_white, widened_coverage
 from charnerf.types import FieldOutput, Hull, RayBundle, RenderOutput, SourceViews
 from charnerf.volume.compositing import composite, expected_depth, weights_from_densities
 
@@ -150,11 +150,12 @@ class PixelNeRFLike:
         )
 
     def _kept(self, maps: PixelAligned, shares: Tensor) -> Tensor:
-        """As the model keeps densities, (P,); drawings that disagree are not widened here."""
+        """As the model: which share of the densities (P,) the drawings leave."""
         if maps.hull is None or self.network.training:
             return torch.ones_like(shares[0, :, 0])
-        coverage = _read(maps.views.images[:, 3:], shares)[..., 0]
-        return (2.0 * coverage[:, ~maps.views.mirrored].amin(-1)).clamp_max(1.0)
+        carving = maps.views.present & ~maps.views.mirrored
+        coverage = widened_coverage(maps.views.images[carving, 3:], maps.hull.dilations[carving])
+        return kept_share(_read(coverage, shares[carving])[..., 0])
 
     def _read_sections(self, maps: PixelAligned, points: Tensor) -> tuple[Tensor, Tensor]:
         if maps.sections is None:

@@ -16,7 +16,7 @@ from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import Pictures, ViewMaps, on_white
+from charnerf.models.view_maps import Pictures, ViewMaps, kept_share, on_white
 from charnerf.models.views.base import AbstractViews
 from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
 
@@ -192,7 +192,11 @@ class CharNeRF(nn.Module):
     def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
         """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
         size = (maps.shape[-1], maps.shape[-2])
-        return ViewMaps.of(views, hull, present, size, sections=self.features.reads_sections)
+        # in training the field learns the outlines by itself: with them it came to 0.2 dB less foreground (docs/ablations.md)
+        outlines = hull is not None and not self.training
+        return ViewMaps.of(
+            views, hull, present, size, sections=self.features.reads_sections, coverage=outlines
+        )
 
     def point_inputs(
         self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor
@@ -204,9 +208,10 @@ class CharNeRF(nn.Module):
         else:
             behind = (sight.along_ray - sight.front) / self.box_half_extent
             edge = sight.edge / maps.cameras.width
-        # in training the field learns the outlines by itself: with this it came to 0.2 dB less foreground (docs/ablations.md)
-        ends = self.has_hull and not self.training
-        kept = maps.kept(sight.coverage) if ends else torch.ones_like(points[:, 0])
+        if sight.coverage is None:
+            kept = torch.ones_like(points[:, 0])
+        else:
+            kept = kept_share(sight.coverage[:, maps.carving])
         places, half_lengths = maps.places(points)
         readings = ViewReadings(
             source_rgb=sight.rgb,

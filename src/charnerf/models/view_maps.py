@@ -25,24 +25,24 @@ class Sight:
     Attributes:
         latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
         rgb: (P, V, 3), colour of the drawings.
-        coverage: (P, V), alpha of the drawings, as widened as their hull; 1 behind a camera.
         shares: (P, V, 2), where they project, in shares of the pictures' sides.
         front: (P, V), m, distance of the hull's front along the view's ray.
         edge: (P, V), pixels, distance from the mask's edge.
         along_ray: (P, V), m, distance of the point along the view's ray.
         source_dirs: (P, V, 3), unit.
         valid: (P, V), bool.
+        coverage: (P, V), alpha of the drawings, as widened as their hull; 1 behind a camera. None where it is not read.
     """
 
     latents: Tensor
     rgb: Tensor
-    coverage: Tensor
     shares: Tensor
     front: Tensor | None
     edge: Tensor | None
     along_ray: Tensor
     source_dirs: Tensor
     valid: Tensor
+    coverage: Tensor | None
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,10 @@ class ViewMaps:
         cameras: (V,).
         parallel: Whether every camera is orthographic: no perspective division, one direction a view.
         map_size: Width and height of the feature maps.
-        pictures: Rows (V * H * W, 4) of colour and coverage, or (V * H * W, 6) where the hull's maps have the pictures' size and
-            lie beside them.
+        pictures: Rows (V * H * W, 3) of colour, then coverage where it is read, then the hull's maps where they have the pictures'
+            size.
         carving: Indices of the views whose silhouettes carve: mirrored ones do not.
+        reads_coverage: Whether the drawings' coverage lies beside the colours.
         hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
             without a hull or where
             they lie beside the colours.
@@ -68,6 +69,7 @@ class ViewMaps:
     map_size: tuple[int, int]
     pictures: Tensor
     carving: Tensor
+    reads_coverage: bool
     hull_rows: Tensor | None
     hull_size: tuple[int, int]
     sections: CrossSections | None
@@ -81,6 +83,7 @@ class ViewMaps:
         map_size: tuple[int, int],
         *,
         sections: bool,
+        coverage: bool,
     ) -> "ViewMaps":
         """Prepare present views (V, ...) and the maps that their hull keeps of them.
 
@@ -90,10 +93,12 @@ class ViewMaps:
             present: Indices of the views in the hull's maps, (V,).
             map_size: Width and height of the feature maps.
             sections: Whether to measure the hull's cross-sections.
+            coverage: Whether to read the drawings' coverage, for `kept_share`.
         """
-        dilations = None if hull is None else hull.dilations[present]
-        pictures = torch.cat((on_white(views.images), _coverage(views.images[:, 3:], dilations)), dim=1)
-        rows, size = None, (0, 0)
+        pictures, rows, size = on_white(views.images), None, (0, 0)
+        if coverage:
+            dilations = None if hull is None else hull.dilations[present]
+            pictures = torch.cat((pictures, widened_coverage(views.images[:, 3:], dilations)), dim=1)
         if hull is not None:
             maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
             size = (maps.shape[-1], maps.shape[-2])
@@ -107,6 +112,7 @@ class ViewMaps:
             map_size=map_size,
             pictures=maps_to_rows(pictures),
             carving=(~views.mirrored).nonzero()[:, 0],
+            reads_coverage=coverage,
             hull_rows=rows,
             hull_size=size,
             sections=cross_sections(hull) if sections and hull is not None else None,
@@ -130,22 +136,14 @@ class ViewMaps:
         return Sight(
             latents=read.unflatten(0, leading),
             rgb=seen[..., :3],
-            coverage=torch.where(in_front, seen[..., 3], 1.0),
             shares=shares,
             front=front,
             edge=edge,
             along_ray=along_ray,
             source_dirs=directions,
             valid=valid,
+            coverage=torch.where(in_front, seen[..., 3], 1.0) if self.reads_coverage else None,
         )
-
-    def kept(self, coverage: Tensor) -> Tensor:
-        """How much of the densities of points (P,) the drawings leave, by their coverage (P, V) there.
-
-        All of it inside of every outline, where pixels are covered by half or more; nothing where a drawing shows nothing at all.
-        The hull, widened so that no surface is cut away, leaves room for figures to grow fat: a smooth field does.
-        """
-        return (2.0 * coverage[:, self.carving].amin(-1)).clamp_max(1.0)
 
     def places(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Places of points (P, 3) in the hull's runs and the runs' half-lengths, (P, 3) each; zeros if they are not read."""
@@ -157,7 +155,7 @@ class ViewMaps:
     def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
         if seen.shape[-1] > 4:
-            return seen[..., 4], seen[..., 5]
+            return seen[..., -2], seen[..., -1]
         if self.hull_rows is None:
             return None, None
         width, height = self.hull_size
@@ -203,7 +201,16 @@ class Pictures:
         return read_rows(self.rows, *own).unflatten(0, shares.shape[:2])
 
 
-def _coverage(alphas: Tensor, dilations: Tensor | None) -> Tensor:
+def kept_share(coverage: Tensor) -> Tensor:
+    """How much of the densities of points (P,) the drawings that carve leave, by their coverage (P, V) there.
+
+    All of it inside of every outline, where pixels are covered by half or more; nothing where a drawing shows nothing at all.
+    The hull, widened so that no surface is cut away, leaves room for figures to grow fat: a smooth field does.
+    """
+    return (2.0 * coverage.amin(-1)).clamp_max(1.0)
+
+
+def widened_coverage(alphas: Tensor, dilations: Tensor | None) -> Tensor:
     """Alphas (V, 1, H, W), those of drawings that disagree widened as the hull was, by its dilations (V,) beyond one pixel."""
     if dilations is None or not bool((dilations > 1.0).any()):
         return alphas
