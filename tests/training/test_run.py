@@ -11,10 +11,10 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from charnerf.errors import ConfigError, DataError
 from charnerf.losses.total import TERMS
-from charnerf.runs import load, load_config
+from charnerf.runs import build_model, load, load_config
 from charnerf.training.clock import RunClock
 from charnerf.training.module import rate_at
-from charnerf.training.run import find_checkpoint, run_training, surface_delta, training_renderer
+from charnerf.training.run import begin, find_checkpoint, run_training, surface_delta, training_renderer
 
 STEPS = 40
 
@@ -114,6 +114,29 @@ def test_a_checkpoint_is_found_or_named(run_folder, tmp_path):
         find_checkpoint("gone.ckpt", tmp_path)
     with pytest.raises(ConfigError, match="ckpt_path: found `last`, but no run beside"):
         find_checkpoint("last", tmp_path / "a/b")
+
+
+def test_a_run_begins_with_the_weights_of_another(run_folder, figure_dataset, tmp_path):
+    settings = (
+        "encoder=single",
+        "schedule=two_phase",
+        "scale.phase_rays=[16,32]",
+        f"start_from={run_folder}",
+    )
+    cfg = small_runs.smoke_config(figure_dataset, *settings)
+    model = build_model(cfg)
+    assert str(run_folder) in begin(model, cfg)
+    for name, value in load(run_folder).network.state_dict().items():
+        torch.testing.assert_close(model.state_dict()[name], value, rtol=0.0, atol=0.0)
+
+
+def test_weights_of_another_model_are_refused_before_work_starts(run_folder, figure_dataset, tmp_path):
+    cfg = small_runs.smoke_config(figure_dataset, f"start_from={run_folder}", "scale.width=24")
+    with pytest.raises(
+        ConfigError, match=r"start_from: found the weights of another model.*model\.width=16 encoder=single "
+    ):
+        run_training(cfg, tmp_path / "run")
+    assert not (tmp_path / "run" / "checkpoints").exists()
 
 
 def test_a_checkpoint_holds_nothing_but_numbers_and_names(run_folder):

@@ -111,6 +111,7 @@ class RunConfig:
     name: str
     seed: CountOrZero
     ckpt_path: str | None
+    start_from: str | None
     trusted_targets: list[str]
     model: ModelSettings
     scale: Scale

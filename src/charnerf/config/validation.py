@@ -70,7 +70,7 @@ def complete_model(cfg: DictConfig) -> DictConfig:
 
 
 def check_files(cfg: DictConfig) -> None:
-    """Check that the data set and the checkpoint that a valid config names are there.
+    """Check that the data set, the checkpoint and the weights that a valid config names are there.
 
     Raises:
         ConfigError: Names each one that is not.
@@ -86,6 +86,11 @@ def check_files(cfg: DictConfig) -> None:
     if cfg.ckpt_path not in (None, "last") and not Path(cfg.ckpt_path).is_file():
         problems.add(
             "ckpt_path", f"found '{cfg.ckpt_path}', which is no file; expected a .ckpt, `last` or null."
+        )
+    if cfg.start_from not in (None, "released") and not Path(cfg.start_from).exists():
+        problems.add(
+            "start_from",
+            f"found '{cfg.start_from}', which does not exist; expected `released`, a run folder, a .ckpt, a .safetensors or null.",
         )
     if problems.found:
         raise ConfigError(as_message(problems.lines()))
