@@ -8,6 +8,7 @@ from charnerf.capture.procedural.character import make_parts
 from charnerf.capture.procedural.figure import SURFACES, make_figure
 from charnerf.capture.procedural.parts import Part, assemble
 from charnerf.capture.procedural.proportions import CHANCES
+from charnerf.capture.procedural.voxels import make_voxel_parts
 from charnerf.data.raycast import RayCaster
 from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface_mesh import shade
@@ -136,3 +137,18 @@ def test_fronts_are_unlike_backs(characters):
         differences.append(np.abs(colours[0] - colours[1])[inside].mean())
     assert np.mean(differences) > 0.03
     assert min(differences) > 0.002
+
+
+def test_no_two_blocks_of_cubes_fill_the_same_place():
+    for seed in range(40):
+        boxes = np.array(
+            [
+                (part.shape.vertices.min(axis=0), part.shape.vertices.max(axis=0))
+                for part in make_voxel_parts(np.random.default_rng(seed))
+            ]
+        )
+        low = np.maximum(boxes[:, None, 0], boxes[None, :, 0])
+        high = np.minimum(boxes[:, None, 1], boxes[None, :, 1])
+        shared = (high - low).clip(0.0).prod(axis=-1)
+        np.fill_diagonal(shared, 0.0)
+        assert shared.max() == 0.0, f"seed {seed}: faces in one plane would flicker"

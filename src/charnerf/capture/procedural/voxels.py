@@ -40,14 +40,31 @@ class Voxels:
         return block
 
     def parts(self) -> list[Part]:
-        """Boxes of equal colour, as few as merging along x, then z, then y gives."""
+        """Boxes of equal colour, as few as merging along x, then z, then y gives.
+
+        A cube that several blocks fill is the last one's: two that share a face would flicker between their colours.
+        """
         parts = []
-        for key, (block, corner) in self._blocks.items():
+        for key, (block, corner) in self._owned().items():
             for low, high, number in _boxes(block):
                 start, end = np.array(corner) + low, np.array(corner) + high
                 shape = box(0.5 * (start + end), 0.5 * (end - start))
                 parts.append(flat(key.rstrip("'"), shape, self._colours[number - 1]))
         return parts
+
+    def _owned(self) -> dict[str, tuple[Block, tuple[int, int, int]]]:
+        """The blocks without the cubes that later ones fill."""
+        low = np.min([corner for _, corner in self._blocks.values()], axis=0)
+        high = np.max([np.add(corner, block.shape) for block, corner in self._blocks.values()], axis=0)
+        taken = np.zeros(high - low, dtype=bool)
+        owned = {}
+        for key, (block, corner) in reversed(self._blocks.items()):
+            place = tuple(
+                slice(start, start + size) for start, size in zip(corner - low, block.shape, strict=True)
+            )
+            owned[key] = (np.where(taken[place], 0, block), corner)
+            taken[place] |= block > 0
+        return {key: owned[key] for key in self._blocks}
 
 
 def _boxes(block: Block) -> list[tuple[NDArray[np.int64], NDArray[np.int64], int]]:
