@@ -209,6 +209,8 @@ class Scene:
             by it.
         at_width: The same scene with its colours read from finer drawings, so many pixels wide, for large
             pictures; None where no finer drawings were given.
+        in_outlines: Which points (P, 3) every drawing that carves shows something of, (P,) bool: beside them the density is
+            zero, in the hull too; None where it is not.
     """
 
     coarse: FieldFunction
@@ -221,6 +223,7 @@ class Scene:
     coarse_hull: Tensor | None = None
     bytes_a_point: int = 16_384
     at_width: Callable[[int], Scene] | None = None
+    in_outlines: Callable[[Tensor], Tensor] | None = None
 
     def answer_densities(self, points: Tensor, view_dirs: Tensor) -> DensityAnswer:
         """Densities of the finest field at points (P, 3), its colours on demand; in two steps where it can."""

@@ -18,6 +18,7 @@ class AnalyticScene:
     box_min: Tensor
     box_max: Tensor
     density_sees_directions: bool = False
+    in_outlines: None = None
 
     def answer_densities(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
         """All at once: the colours beside are not read."""

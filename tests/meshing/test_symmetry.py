@@ -90,3 +90,10 @@ def test_the_hull_holds_both_sides():
     assert bool(hull_contains(wide, points)[needed].all())
     assert torch.equal(wide.occupancy, wide.occupancy.flip(0))
     assert float(hull_contains(wide, points).float().mean()) < 1.6 * float(needed.float().mean())
+
+
+def test_outlines_hold_where_either_side_does():
+    left_only = dataclasses.replace(_scene(), in_outlines=lambda points: points[:, 0] > 0.5)
+    points = torch.tensor(((0.7, 0.0, 1.0), (-0.7, 0.0, 1.0), (0.2, 0.0, 1.0)))
+    assert symmetric_scene(left_only).in_outlines(points).tolist() == [True, True, False]
+    assert symmetric_scene(_scene()).in_outlines is None

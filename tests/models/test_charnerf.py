@@ -11,9 +11,13 @@ import tiny_models
 from charnerf.data.mixed import stack_hulls, stack_views
 from charnerf.errors import ShapeError
 from charnerf.geometry.cameras import project_into_all
+from charnerf.geometry.hull import hull_contains, may_hold
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
 from charnerf.types import FieldOutput, Hull, SourceViews
+from charnerf.volume.quadrature import PiecewiseConstant
+from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.culled import CulledRenderer
 
 PERSON = helpers.person(symmetric=False)
 
@@ -174,6 +178,34 @@ def test_density_ends_at_the_outlines(person_views):
     assert bool((densities[covered >= 0.5] > 0.0).all()) and bool((covered >= 0.5).any())
     assert bool(
         (ask(model.train(), person_views, points).densities > 0.0).all()
+    )  # what trains learns them itself
+
+
+def test_what_lies_beside_the_outlines_is_not_asked(person_views):
+    """The hull is wider than the drawings: the rest of it is empty, and leaving it out changes nothing."""
+    model = tiny_models.shake(tiny_models.tiny_model(views="mirrored")).eval()
+    scene = model.scene(model.encode(person_views), 0)
+    points = some_points(4000)
+    held = may_hold(scene, points)
+    densities = scene.field(points, torch.zeros_like(points)).densities
+    in_hull = hull_contains(scene.hull, points)
+    assert bool((densities[in_hull & ~held] == 0.0).all()) and bool((in_hull & ~held).any())
+    settings = {
+        "quadrature": PiecewiseConstant(),
+        "num_coarse": 16,
+        "num_fine": 0,
+        "hull_steps": 96,
+        "memory_mib": 256.0,
+    }
+    camera = helpers.target_cameras(3, size=24)[1]
+    for renderer in (CulledRenderer(**settings), AdaptiveRenderer(**settings, tolerance=0.01)):
+        found = renderer.render_camera(scene, camera)
+        asked = renderer.render_camera(replace(scene, in_outlines=None), camera)
+        torch.testing.assert_close(found.finest.rgb, asked.finest.rgb, rtol=0.0, atol=1e-5)
+        torch.testing.assert_close(found.finest.opacity, asked.finest.opacity, rtol=0.0, atol=1e-5)
+        assert found.left_out.samples > asked.left_out.samples
+    assert (
+        model.train().scene(model.encode(person_views), 0).in_outlines is None
     )  # what trains learns them itself
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 from charnerf.bench.baseline import PixelNeRFLike
 from charnerf.bench.headline import Workbench
 from charnerf.bench.subjects import Subject, hull_in_float64
-from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.hull import may_hold
 from charnerf.models.lookup import maps_to_rows
 from charnerf.types import FieldOutput, Scene
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -70,12 +70,9 @@ def variants(bench: Workbench) -> dict[str, Variant]:
 
 def _masked(scene: Scene) -> Callable[[Tensor, Tensor], FieldOutput]:
     """The field with the hull applied, evaluated only inside."""
-    hull = scene.hull
 
     def field(points: Tensor, dirs: Tensor) -> FieldOutput:
-        if hull is None:
-            return scene.coarse(points, dirs)
-        inside = hull_contains(hull, points).nonzero()[:, 0]
+        inside = may_hold(scene, points).nonzero()[:, 0]
         answer = scene.coarse(points[inside], dirs[inside])
         return FieldOutput(
             rgb=points.new_zeros(points.shape).index_copy(0, inside, answer.rgb),

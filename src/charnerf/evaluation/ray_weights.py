@@ -21,7 +21,7 @@ from charnerf.data.surface import load_surface_mesh
 from charnerf.errors import DataError
 from charnerf.evaluation.evaluate import fixed_views
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import stratified_t_vals
 from charnerf.models.charnerf import CharNeRF
@@ -243,9 +243,7 @@ def _measured(
 def _densities(scene: Scene, points: Tensor, dirs: Tensor) -> Tensor:
     """Densities of the finest field at samples (R, S, 3), zero outside the hull."""
     flat, towards = points.reshape(-1, 3), dirs.reshape(-1, 3)
-    packed = torch.arange(len(flat), device=flat.device)
-    if scene.hull is not None:
-        packed = hull_contains(scene.hull, flat).nonzero()[:, 0]
+    packed = may_hold(scene, flat).nonzero()[:, 0]
     densities = flat.new_zeros(len(flat))
     for part in packed.split(_POINTS_AT_ONCE):
         densities[part] = scene.answer_densities(flat[part], towards[part]).densities.to(densities.dtype)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, merge_t_vals, stratified_t_vals
 from charnerf.models.charnerf import CharNeRF, EncodedViews
@@ -105,11 +105,9 @@ def place(
 
 
 def _look(scene: Scene, rays: RayBundle, t_vals: Tensor) -> tuple[Tensor, Tensor]:
-    """Points (R, S, 3) along rays, and which lie inside the hull (R, S)."""
+    """Points (R, S, 3) along rays, and which a density may be at (R, S)."""
     points = points_along(rays, t_vals)
-    if scene.hull is None:
-        return points, torch.ones_like(t_vals, dtype=torch.bool)
-    return points, hull_contains(scene.hull, points)
+    return points, may_hold(scene, points)
 
 
 def _in_chunks(function: Callable[[Tensor, Tensor], Tensor], points: Tensor, dirs: Tensor) -> Tensor:

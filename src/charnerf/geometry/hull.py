@@ -14,7 +14,7 @@ from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all
 from charnerf.geometry.occupied import POOL, RAYS_AT_ONCE, candidates, coarse_occupancy, occupied_at
 from charnerf.geometry.rays import box_interval
-from charnerf.types import Cameras, Hull, RayBundle, SourceViews
+from charnerf.types import Cameras, Hull, RayBundle, Scene, SourceViews
 
 log = logging.getLogger(__name__)
 
@@ -73,6 +73,19 @@ def hull_contains(hull: Hull, points: Tensor) -> Tensor:
     index = scaled.clamp(0, cells - 1).long()
     flat = (index[..., 0] * cells + index[..., 1]) * cells + index[..., 2]
     return inside & hull.occupancy.reshape(-1)[flat]
+
+
+def may_hold(scene: Scene, points: Tensor) -> Tensor:
+    """Whether a scene may have a density at points (..., 3), (...) bool: elsewhere it is zero and need not be asked."""
+    flat = points.reshape(-1, 3)
+    index = torch.arange(len(flat), device=flat.device)
+    if scene.hull is not None:
+        index = hull_contains(scene.hull, flat).nonzero()[:, 0]
+    if scene.in_outlines is not None:
+        index = index[scene.in_outlines(flat[index])]
+    held = torch.zeros(len(flat), dtype=torch.bool, device=flat.device)
+    held[index] = True
+    return held.reshape(points.shape[:-1])
 
 
 def occupied_edges(

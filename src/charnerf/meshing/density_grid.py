@@ -18,7 +18,7 @@ from torch.nn import functional as F
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import fibonacci_hemisphere
-from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.hull import may_hold
 from charnerf.geometry.safe import safe_normalize
 from charnerf.types import LeftOut, Scene
 
@@ -70,9 +70,7 @@ class DensityGrid:
 
 def densities_inside(scene: Scene, points: Tensor, *view_dirs: Tensor) -> Tensor:
     """Densities (P,), 1/m, of points (P, 3): the mean over view_dirs, (P, 3) each; zero outside the hull, unevaluated."""
-    inside = torch.arange(len(points), device=points.device)
-    if scene.hull is not None:
-        inside = hull_contains(scene.hull, points).nonzero()[:, 0]
+    inside = may_hold(scene, points).nonzero()[:, 0]
     densities = points.new_zeros(len(points))
     for part in inside.split(CHUNK):
         answers = [scene.answer_densities(points[part], dirs[part]).densities for dirs in view_dirs]
@@ -173,11 +171,10 @@ class GridSampler:
         """Which points lie inside the hull and off the outermost layer, (X, Y, Z) bool."""
         inside = np.zeros(self.shape, bool)
         inside[1:-1, 1:-1, 1:-1] = True
-        if self._scene.hull is not None:
-            for x in range(1, self.shape[0] - 1):
-                layer = np.argwhere(inside[x])
-                index = np.concatenate((np.full((len(layer), 1), x), layer), axis=1)
-                inside[x][inside[x]] = hull_contains(self._scene.hull, self._points(index)).cpu().numpy()
+        for x in range(1, self.shape[0] - 1):
+            layer = np.argwhere(inside[x])
+            index = np.concatenate((np.full((len(layer), 1), x), layer), axis=1)
+            inside[x][inside[x]] = may_hold(self._scene, self._points(index)).cpu().numpy()
         return inside
 
     @torch.no_grad()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from charnerf.geometry.hull import hull_contains
+from charnerf.geometry.hull import may_hold
 from charnerf.geometry.occupied import coarse_occupancy
 from charnerf.meshing.density_grid import densities_inside
 from charnerf.types import DensityAnswer, FieldFunction, FieldOutput, Hull, Scene, TensorRecord
@@ -46,7 +46,7 @@ def symmetric_scene(scene: Scene) -> Scene:
 
     field = _symmetric_field(scene)
     hull = None if scene.hull is None else symmetric_hull(scene.hull)
-    at_width = scene.at_width
+    at_width, in_outlines = scene.at_width, scene.in_outlines
     return replace(
         scene,
         coarse=field,
@@ -55,6 +55,9 @@ def symmetric_scene(scene: Scene) -> Scene:
         densities_first=densities,
         coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
         at_width=None if at_width is None else lambda width: symmetric_scene(at_width(width)),
+        in_outlines=None
+        if in_outlines is None
+        else lambda points: in_outlines(points) | in_outlines(mirrored(points, points)[0]),
     )
 
 
@@ -68,9 +71,7 @@ def _symmetric_field(scene: Scene) -> FieldFunction:
     """Density of both sides, colours of the own one."""
 
     def masked(points: Tensor, view_dirs: Tensor) -> FieldOutput:
-        if scene.hull is None:
-            return scene.field(points, view_dirs)
-        index = hull_contains(scene.hull, points).nonzero()[:, 0]
+        index = may_hold(scene, points).nonzero()[:, 0]
         found = scene.field(points[index], view_dirs[index])
         rgb = torch.full_like(points, 0.5).index_copy(0, index, found.rgb)
         return FieldOutput(rgb, points.new_zeros(len(points)).index_copy(0, index, found.densities))

@@ -151,9 +151,10 @@ class CharNeRF(nn.Module):
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
         latents = self.coarse.hoist(rows), None if self.fine is None else self.fine.hoist(rows)
+        view_maps = self.view_maps(views, hull, present, maps)
         answer = partial(
             self.point_inputs,
-            maps=self.view_maps(views, hull, present, maps),
+            maps=view_maps,
             mirrored=views.mirrored.to(maps.dtype),
         )
 
@@ -177,6 +178,7 @@ class CharNeRF(nn.Module):
                 coarse_hull=coarse_hull,
                 bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
                 at_width=at_width,
+                in_outlines=None if view_maps.shown is None else view_maps.in_outlines,
             )
 
         if encoded.detailed is None:

@@ -23,6 +23,17 @@ def bilinear_rows(pixels: Tensor, *, width: int, height: int) -> tuple[Tensor, T
         indices (P * V, 4) into rows ordered (V, height, width), and weights (P * V, 4) that sum to 1.
     """
     num_views = pixels.shape[1]
+    left, top, fx, fy = first_pixels(pixels, width=width, height=height)
+    step_x, step_y = min(1, width - 1), width * min(1, height - 1)
+    view_offset = torch.arange(num_views, device=pixels.device) * (width * height)
+    corner = view_offset + top * width + left
+    indices = torch.stack((corner, corner + step_x, corner + step_y, corner + step_y + step_x), dim=-1)
+    weights = torch.stack(((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy), dim=-1)
+    return indices.reshape(-1, 4), weights.reshape(-1, 4)
+
+
+def first_pixels(pixels: Tensor, *, width: int, height: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Column and row of the first of the four pixels around positions (..., 2), and how far on the positions lie, (...) each."""
     safe = torch.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
     x = (safe[..., 0] - 0.5).clamp(0.0, width - 1.0)
     y = (safe[..., 1] - 0.5).clamp(0.0, height - 1.0)
@@ -30,13 +41,7 @@ def bilinear_rows(pixels: Tensor, *, width: int, height: int) -> tuple[Tensor, T
         x.detach().long().clamp_max(max(width - 2, 0)),
         y.detach().long().clamp_max(max(height - 2, 0)),
     )
-    fx, fy = x - left, y - top
-    step_x, step_y = min(1, width - 1), width * min(1, height - 1)
-    view_offset = torch.arange(num_views, device=pixels.device) * (width * height)
-    corner = view_offset + top * width + left
-    indices = torch.stack((corner, corner + step_x, corner + step_y, corner + step_y + step_x), dim=-1)
-    weights = torch.stack(((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy), dim=-1)
-    return indices.reshape(-1, 4), weights.reshape(-1, 4)
+    return left, top, x - left, y - top
 
 
 def read_rows(rows: Tensor, indices: Tensor, weights: Tensor) -> Tensor:

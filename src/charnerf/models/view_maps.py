@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from charnerf.geometry.cameras import directions_to_points, project_into_all
 from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
 from charnerf.geometry.resizing import resized_pictures
-from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
+from charnerf.models.lookup import bilinear_rows, first_pixels, maps_to_rows, read_rows
 from charnerf.types import Cameras, Hull, SourceViews
 
 
@@ -56,7 +56,8 @@ class ViewMaps:
         pictures: Rows (V * H * W, 3) of colour, then coverage where it is read, then the hull's maps where they have the pictures'
             size.
         carving: Indices of the views whose silhouettes carve: mirrored ones do not.
-        reads_coverage: Whether the drawings' coverage lies beside the colours.
+        shown: Whether the drawings that carve show anything at four pixels by their first one, (C, H - 1, W - 1) bool; None where
+            coverage is not read.
         hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
             without a hull or where
             they lie beside the colours.
@@ -69,7 +70,7 @@ class ViewMaps:
     map_size: tuple[int, int]
     pictures: Tensor
     carving: Tensor
-    reads_coverage: bool
+    shown: Tensor | None
     hull_rows: Tensor | None
     hull_size: tuple[int, int]
     sections: CrossSections | None
@@ -96,9 +97,12 @@ class ViewMaps:
             coverage: Whether to read the drawings' coverage, for `kept_share`.
         """
         pictures, rows, size = on_white(views.images), None, (0, 0)
+        carving, shown = (~views.mirrored).nonzero()[:, 0], None
         if coverage:
             dilations = None if hull is None else hull.dilations[present]
-            pictures = torch.cat((pictures, widened_coverage(views.images[:, 3:], dilations)), dim=1)
+            alphas = widened_coverage(views.images[:, 3:], dilations)
+            pictures = torch.cat((pictures, alphas), dim=1)
+            shown = F.max_pool2d(alphas[carving, 0], 2, stride=1) > 0.0
         if hull is not None:
             maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
             size = (maps.shape[-1], maps.shape[-2])
@@ -111,8 +115,8 @@ class ViewMaps:
             parallel=bool(views.cameras.orthographic.all()),
             map_size=map_size,
             pictures=maps_to_rows(pictures),
-            carving=(~views.mirrored).nonzero()[:, 0],
-            reads_coverage=coverage,
+            carving=carving,
+            shown=shown,
             hull_rows=rows,
             hull_size=size,
             sections=cross_sections(hull) if sections and hull is not None else None,
@@ -142,8 +146,16 @@ class ViewMaps:
             along_ray=along_ray,
             source_dirs=directions,
             valid=valid,
-            coverage=torch.where(in_front, seen[..., 3], 1.0) if self.reads_coverage else None,
+            coverage=torch.where(in_front, seen[..., 3], 1.0) if self.shown is not None else None,
         )
+
+    def in_outlines(self, points: Tensor) -> Tensor:
+        """Which points (P, 3) may have coverage in every drawing that carves, (P,) bool: `kept_share` of the others is 0."""
+        assert self.shown is not None  # asked only where coverage is read
+        pixels, _, in_front = project_into_all(self.cameras[self.carving], points)
+        left, top, _, _ = first_pixels(pixels, width=self.cameras.width, height=self.cameras.height)
+        view = torch.arange(len(self.shown), device=points.device)
+        return (self.shown[view, top, left] | ~in_front).all(-1)
 
     def places(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Places of points (P, 3) in the hull's runs and the runs' half-lengths, (P, 3) each; zeros if they are not read."""

@@ -184,7 +184,7 @@ class AdaptiveRenderer(AbstractRenderer):
             join = lambda name: torch.cat([getattr(block, name) for block in blocks])  # noqa: E731
             rgb[index], opacity[index] = join("rgb"), join("opacity")
             depth[index], estimated[index] = join("depth"), join("estimated")
-        evaluated = sum(len(block.samples) for block in blocks)
+        evaluated = sum(block.samples.num_evaluated for block in blocks)
         total = max(evaluated, num_rays * self.num_coarse)
         used = sum(int(block.used.sum()) for block in blocks)
         return Rendering(

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.geometry.hull import hull_contains, occupied_edges
+from charnerf.geometry.hull import may_hold, occupied_edges
 from charnerf.geometry.rays import box_interval, occupied_to_t, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, merge_t_vals, stratified_t_vals
 from charnerf.types import (
@@ -127,8 +127,7 @@ class AbstractRenderer(ABC):
         points = points_along(seen.rays, t_vals)
         dirs = seen.rays.directions[:, None].expand_as(points)
         inside = (seen.length > 0)[:, None].expand_as(t_vals)
-        if scene.hull is not None:
-            inside = inside & hull_contains(scene.hull, points)
+        inside = inside & may_hold(scene, points)
         chunk = chunk_size(self.memory_mib, scene.bytes_a_point)
         if not torch.is_grad_enabled():  # each chunk would give the maps a dense gradient of its own
             chunk = min(chunk, self.points_at_once, points_in_caches(scene.bytes_a_point))

@@ -7,6 +7,7 @@ evaluation; -1 is none.
 import torch
 from torch import Tensor
 
+from charnerf.geometry.hull import may_hold
 from charnerf.types import DensityAnswer, RayBundle, Scene, TensorRecord
 from charnerf.volume.renderers.base import POINTS_AT_ONCE, points_in_caches
 
@@ -26,6 +27,7 @@ class Samples:
         self.scene = scene
         self.rays = rays
         self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.bytes_a_point))
+        self.num_evaluated = 0
         self.num_colours = 0
         self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
         self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
@@ -33,16 +35,16 @@ class Samples:
         self._answers: list[tuple[int, DensityAnswer]] = []
 
     def __len__(self) -> int:
-        """Samples evaluated."""
+        """Samples whose density is known."""
         return len(self._densities) - 1
 
     def add(self, rows: Tensor, t_vals: Tensor, wanted: Tensor) -> Tensor:
-        """Evaluate densities of samples of some rays.
+        """Find densities of samples of some rays: evaluated where the scene may hold something, else zero.
 
         Args:
             rows: Which rays, (r,).
             t_vals: Their samples, (r, K), m.
-            wanted: Samples to evaluate, (r, K), bool.
+            wanted: Samples to find, (r, K), bool.
 
         Returns:
             Numbers of the samples, (r, K); -1 where not wanted.
@@ -51,18 +53,23 @@ class Samples:
         ray = rows[row]
         directions = self.rays.directions[ray]
         points = torch.addcmul(self.rays.origins[ray], directions, t_vals[row, column, None])
-        start, found = len(self), []
-        for first in range(0, len(points), self.size):
-            some = slice(first, first + self.size)
+        start, count, found = len(self), len(points), []
+        held = may_hold(self.scene, points)
+        order = torch.cat(
+            (held.nonzero()[:, 0], (~held).nonzero()[:, 0])
+        )  # no colour of the latter is ever wanted
+        asked = order[: int(held.sum())]
+        for first, some in zip(range(0, len(asked), self.size), asked.split(self.size), strict=False):
             answer = self.scene.answer_densities(points[some], directions[some])
             self._answers.append((start + first, answer))
             found.append(answer.densities)
-        count = len(points)
+        self.num_evaluated += len(asked)
+        found.append(self._densities.new_zeros(count - len(asked)))
         self._densities = torch.cat((self._densities[:-1], *found, self._densities[-1:]))
         self._rgb = torch.cat((self._rgb[:-1], self._rgb.new_full((count + 1, 3), UNKNOWN)))
         self._known = torch.cat((self._known[:-1], self._known.new_zeros(count + 1)))
         numbers = torch.full_like(wanted, -1, dtype=torch.long)
-        numbers[row, column] = torch.arange(start, start + count, device=numbers.device)
+        numbers[row[order], column[order]] = torch.arange(start, start + count, device=numbers.device)
         return numbers
 
     def densities(self, numbers: Tensor) -> Tensor:
