@@ -321,7 +321,9 @@ class Hero:
             return MARGIN
         cell = (hull.box_max - hull.box_min) / torch.tensor(hull.occupancy.shape, device=box_min.device)
         centres = hull.box_min + (occupied + 0.5) * cell
-        return MARGIN * max(1.0, math.sqrt(float((centres - box_min.new_tensor(CENTRE)).square().sum(-1).max())))
+        return MARGIN * max(
+            1.0, math.sqrt(float((centres - box_min.new_tensor(CENTRE)).square().sum(-1).max()))
+        )
 
     def _scene_for(self, size: int) -> Scene:
         """The scene for pictures of a size: a pixel of theirs covers as much as one of the drawings that it reads."""

@@ -13,6 +13,7 @@ from charnerf.config.hints import (
     SCHEMAS,
     Above,
     AtLeast,
+    AtMost,
     Part,
     alternatives,
     describe,
@@ -82,6 +83,8 @@ def check_annotated(hint: Any, value: Any, key: str, problems: Problems) -> None
     for note in notes:
         if isinstance(note, AtLeast) and not value >= note.value:
             problems.add(key, f"found {value}, expected at least {note.value}.")
+        if isinstance(note, AtMost) and not value <= note.value:
+            problems.add(key, f"found {value}, expected at most {note.value}.")
         if isinstance(note, Above) and not value > note.value:
             problems.add(key, f"found {value}, expected more than {note.value}.")
 

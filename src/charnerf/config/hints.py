@@ -33,6 +33,13 @@ class AtLeast:
 
 
 @dataclasses.dataclass(frozen=True)
+class AtMost:
+    """Largest number that is accepted."""
+
+    value: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Above:
     """Number that every accepted one exceeds."""
 

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from charnerf.config.hints import Above, AtLeast, Part
+from charnerf.config.hints import Above, AtLeast, AtMost, Part
 
 Count = Annotated[int, AtLeast(1)]
 CountOrZero = Annotated[int, AtLeast(0)]
+Share = Annotated[float, AtLeast(0), AtMost(1)]
 
 
 def _part(*homes: str, given: Sequence[str] = ()) -> Any:
@@ -53,7 +54,8 @@ class Budget:
 class Sampling:
     """What training and validation draw from the data."""
 
-    foreground_share: Annotated[float, AtLeast(0)]
+    foreground_share: Share
+    outline_share: Share
     space_points: CountOrZero
     train_splits: list[str]
     val_split: str
@@ -64,7 +66,7 @@ class Sampling:
     surface_delta: Annotated[float, Above(0)] | None
     memory_mib: Annotated[float, Above(0)]
     workers: CountOrZero | None
-    final_rate: Annotated[float, AtLeast(0)]
+    final_rate: Share
     gradient_clip: Annotated[float, Above(0)] | None
 
 
