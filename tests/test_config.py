@@ -139,7 +139,10 @@ def test_wrong_types_are_named() -> None:
 def test_numbers_out_of_range_are_named() -> None:
     assert problem("scale.width=0", "combinator=mean") == "scale.width: found 0, expected at least 1."
     assert problem("budget.seconds=0") == "budget.seconds: found 0, expected more than 0."
-    assert problem("sampling.outline_share=1.5") == "sampling.outline_share: found 1.5, expected at most 1."
+    assert (
+        problem("sampling.foreground_share=1.5")
+        == "sampling.foreground_share: found 1.5, expected at most 1."
+    )
     assert problem("data.views=0") == "data.views: found 0, expected at least 1."
 
 

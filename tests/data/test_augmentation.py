@@ -33,7 +33,7 @@ def batch(figure_dataset):
         root=figure_dataset, names=("lefty",), carve=carve, memory_mib=64.0, surface_of=surface_of
     )
     dataset = MixedDataset(
-        store=store, characters=1, foreground_share=0.75, outline_share=0.0, space_points=200,
+        store=store, characters=1, foreground_share=0.75, space_points=200,
         reads_depth=True, used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5,
     )  # fmt: skip
     return dataset[BatchRequest(step=0, rays=64, surface_points=300, phase=0, loss_weights={})]

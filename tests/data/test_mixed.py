@@ -7,10 +7,8 @@ import weakref
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
-from scipy.ndimage import binary_dilation
 
 import helpers
 from charnerf.data.augmentation import NoAugmentation
@@ -50,7 +48,7 @@ def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 
 
 def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
     settings = {
-        "characters": 1, "foreground_share": 0.75, "outline_share": 0.0, "space_points": 0,
+        "characters": 1, "foreground_share": 0.75, "space_points": 0,
         "reads_depth": False, "used_views": Turnaround(), "augmentation": NoAugmentation(), "seed": 5,
     }  # fmt: skip
     return MixedDataset(store=store, **settings | changes)
@@ -113,26 +111,6 @@ def test_rays_carry_the_colours_that_the_figure_has(store):
 def test_the_share_of_foreground_is_kept(store, share):
     batch = dataset_of(store, foreground_share=share)[request(rays=4000)]
     assert (batch.alpha > 0).float().mean().item() == pytest.approx(share)
-
-
-@pytest.mark.parametrize("share", [0.25, 1.0])
-def test_the_share_beside_outlines_is_kept_and_lies_on_both_sides(store, share):
-    """Other pixels are drawn as without it: here from the foreground alone."""
-    batch = dataset_of(store, foreground_share=1.0, outline_share=share)[request(rays=4000)]
-    one = store.open(batch.names[0])
-    shown = one.images[..., 3].numpy() > 0
-    beside = np.zeros_like(shown)
-    for picture, mask in zip(beside, shown, strict=True):  # a step of 5 x 5 from the other kind, by scipy
-        square = np.ones((5, 5), bool)
-        picture[:] = binary_dilation(mask, square) & binary_dilation(~mask, square)
-    drawable = np.zeros(shown.size, bool)
-    drawable[one.outline.numpy()] = True
-    assert not (drawable & ~beside.reshape(-1)).any()
-    assert (
-        drawable | ~(beside & shown).reshape(-1)
-    ).all()  # before the hull all of those that show the character
-    assert 0.3 < float((batch.alpha[0, : int(share * 4000)] > 0).float().mean()) < 0.9
-    assert bool((batch.alpha[0, int(share * 4000) :] > 0).all())
 
 
 def test_background_is_drawn_only_where_the_hull_may_be(store):

@@ -55,7 +55,6 @@ class Sampling:
     """What training and validation draw from the data."""
 
     foreground_share: Share
-    outline_share: Share
     space_points: CountOrZero
     train_splits: list[str]
     val_split: str

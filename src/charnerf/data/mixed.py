@@ -26,7 +26,6 @@ class MixedDataset(Dataset[TrainBatch]):
         characters: B, characters a step.
         foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white;
             the rest is drawn from pixels beside it whose rays may meet the hull.
-        outline_share: Share of the rays drawn from pixels beside the silhouette's outline, on either side, before the others.
         space_points: Labelled points a step, 0 where no loss reads them.
         reads_depth: Whether depth pictures are read.
         used_views: The model's rule from drawings to views; a hull has maps of all of those.
@@ -40,7 +39,6 @@ class MixedDataset(Dataset[TrainBatch]):
         store: CharacterStore,
         characters: int,
         foreground_share: float,
-        outline_share: float,
         space_points: int,
         reads_depth: bool,
         used_views: Callable[[SourceViews], SourceViews],
@@ -50,7 +48,6 @@ class MixedDataset(Dataset[TrainBatch]):
         self.store = store
         self.characters = min(characters, len(store))
         self.foreground_share = foreground_share
-        self.outline_share = outline_share
         self.space_points = space_points
         self.reads_depth = reads_depth
         self.used_views = used_views
@@ -112,15 +109,13 @@ class MixedDataset(Dataset[TrainBatch]):
         return rays, rgb * alpha[:, None] + (1.0 - alpha[:, None]), alpha, depth
 
     def _pixels(self, one: OpenCharacter, num_rays: int, generator: torch.Generator) -> Tensor:
-        """Flat indices (R,) of pixels: a share beside outlines, then one that shows the character, the rest before its hull."""
+        """Flat indices (R,) of pixels: a share that shows the character, the rest background before its hull."""
         share = self.foreground_share
         if len(one.foreground) == 0 or len(one.background) == 0:
             share = float(len(one.background) == 0)
-        beside = round(self.outline_share * num_rays) if len(one.outline) else 0
-        shown = round(share * (num_rays - beside))
-        counts = (beside, shown, num_rays - beside - shown)
+        counts = (round(share * num_rays), num_rays - round(share * num_rays))
         picked = []
-        for pixels, count in zip((one.outline, one.foreground, one.background), counts, strict=True):
+        for pixels, count in zip((one.foreground, one.background), counts, strict=True):
             if count:
                 picked.append(pixels[torch.randint(len(pixels), (count,), generator=generator)])
         return torch.cat(picked).long()

@@ -10,7 +10,6 @@ from typing import final
 
 import torch
 from torch import Tensor
-from torch.nn import functional as F
 
 from charnerf.data.characters import Character, load_character
 from charnerf.data.surface import AbstractSurface
@@ -19,8 +18,6 @@ from charnerf.geometry.silhouettes import hull_silhouettes
 from charnerf.types import Hull, SourceViews
 
 log = logging.getLogger(__name__)
-
-OUTLINE = 2  # pixels
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,6 @@ class OpenCharacter:
         hull: Hull of its drawings (B = 1), None for a model without.
         foreground: Flat indices into (N, H, W) of pixels that show the character, int32.
         background: Those of the other pixels whose rays may meet the hull, int32: of the rest there is nothing to learn.
-        outline: Those of both within `OUTLINE` pixels of the other kind, int32.
         surface: What surface points are drawn from, None where nothing reads them or there is no mesh.
     """
 
@@ -42,7 +38,6 @@ class OpenCharacter:
     hull: Hull | None
     foreground: Tensor
     background: Tensor
-    outline: Tensor
     surface: AbstractSurface | None
 
     @property
@@ -50,17 +45,7 @@ class OpenCharacter:
         """Memory of the tensors."""
         hull = 0 if self.hull is None else self.hull.occupancy.numel() + 8 * self.hull.front_depths.numel()
         surface = 0 if self.surface is None else self.surface.size_bytes
-        pixels = self.foreground.numel() + self.background.numel() + self.outline.numel()
-        return self.images.numel() + 4 * pixels + hull + surface
-
-
-def _beside(shown: Tensor) -> Tensor:
-    """Pixels (N, H, W) with others of the other kind, shown or not, at most `OUTLINE` rows and columns away."""
-    most, least = (
-        F.max_pool2d(kind.float()[:, None], 2 * OUTLINE + 1, stride=1, padding=OUTLINE)[:, 0]
-        for kind in (shown, ~shown)
-    )
-    return (most > 0) & (least > 0)
+        return self.images.numel() + 4 * (self.foreground.numel() + self.background.numel()) + hull + surface
 
 
 SurfaceOf = Callable[[Character], AbstractSurface | None]
@@ -119,13 +104,11 @@ class CharacterStore:
         except DataError as err:
             raise DataError(f"{self.root / name}: {err}") from err
         shown = images[..., 3] > 0
+        foreground = shown.reshape(-1).nonzero()[:, 0].to(torch.int32)
         near = ~shown if hull is None else hull_silhouettes(hull[0], character.cameras) & ~shown
-        foreground, background, outline = (
-            mask.reshape(-1).nonzero()[:, 0].to(torch.int32)
-            for mask in (shown, near, _beside(shown) & (shown | near))
-        )
+        background = near.reshape(-1).nonzero()[:, 0].to(torch.int32)
         surface = self.surface_of(character)
-        opened = OpenCharacter(character, images, hull, foreground, background, outline, surface)
+        opened = OpenCharacter(character, images, hull, foreground, background, surface)
         self._seconds += perf_counter() - start
         self._open[name] = opened
         self._used_bytes += opened.size_bytes

@@ -165,7 +165,6 @@ def build_data(
             store=store,
             characters=cfg.scale.batch_characters,
             foreground_share=sampling.foreground_share,
-            outline_share=sampling.outline_share,
             space_points=sampling.space_points if reads(cfg, losses, "occupancy") else 0,
             reads_depth=reads(cfg, losses, "depth"),
             used_views=model.views,
