@@ -35,7 +35,7 @@ NUM_COARSE, NUM_FINE = 64, 32  # its samples a ray
 
 @dataclass(frozen=True)
 class PixelAligned:
-    """What the baseline reads: maps (V, C, h, w) of one character, not hoisted."""
+    """What the baseline reads: maps (V, C, h, w) of one character, not hoisted; coverage of the views that carve alone."""
 
     views: SourceViews
     feature_maps: Tensor
@@ -43,6 +43,8 @@ class PixelAligned:
     hull: Hull | None
     hull_maps: Tensor | None
     sections: CrossSections | None
+    carving: Tensor
+    coverage: Tensor | None
 
     @classmethod
     def of(cls, encoded: EncodedViews, index: int = 0) -> "PixelAligned":
@@ -51,7 +53,11 @@ class PixelAligned:
         hull = None if encoded.hull is None else encoded.hull[index]
         maps = None if hull is None else torch.stack((hull.front_depths, hull.edge_distances), dim=1)
         sections = None if hull is None else cross_sections(hull)
-        return cls(views, encoded.feature_maps[index], on_white(views.images), hull, maps, sections)
+        carving, coverage = (views.present & ~views.mirrored).nonzero()[:, 0], None
+        if hull is not None:
+            coverage = widened_coverage(views.images[carving, 3:], hull.dilations[carving])
+        pictures = on_white(views.images)
+        return cls(views, encoded.feature_maps[index], pictures, hull, maps, sections, carving, coverage)
 
 
 @final
@@ -151,11 +157,9 @@ class PixelNeRFLike:
 
     def _kept(self, maps: PixelAligned, shares: Tensor) -> Tensor:
         """As the model: which share of the densities (P,) the drawings leave."""
-        if maps.hull is None or self.network.training:
+        if maps.coverage is None or self.network.training:
             return torch.ones_like(shares[0, :, 0])
-        carving = maps.views.present & ~maps.views.mirrored
-        coverage = widened_coverage(maps.views.images[carving, 3:], maps.hull.dilations[carving])
-        return kept_share(_read(coverage, shares[carving])[..., 0])
+        return kept_share(_read(maps.coverage, shares[maps.carving])[..., 0])
 
     def _read_sections(self, maps: PixelAligned, points: Tensor) -> tuple[Tensor, Tensor]:
         if maps.sections is None:

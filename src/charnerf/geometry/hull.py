@@ -77,15 +77,14 @@ def hull_contains(hull: Hull, points: Tensor) -> Tensor:
 
 def may_hold(scene: Scene, points: Tensor) -> Tensor:
     """Whether a scene may have a density at points (..., 3), (...) bool: elsewhere it is zero and need not be asked."""
-    flat = points.reshape(-1, 3)
-    index = torch.arange(len(flat), device=flat.device)
-    if scene.hull is not None:
-        index = hull_contains(scene.hull, flat).nonzero()[:, 0]
+    if scene.hull is None:
+        held = torch.ones_like(points[..., 0], dtype=torch.bool)
+    else:
+        held = hull_contains(scene.hull, points)
     if scene.in_outlines is not None:
-        index = index[scene.in_outlines(flat[index])]
-    held = torch.zeros(len(flat), dtype=torch.bool, device=flat.device)
-    held[index] = True
-    return held.reshape(points.shape[:-1])
+        index = held.nonzero(as_tuple=True)
+        held[index] = scene.in_outlines(points[index])
+    return held
 
 
 def occupied_edges(

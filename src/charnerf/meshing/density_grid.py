@@ -157,7 +157,7 @@ class GridSampler:
         self.shape: tuple[int, int, int] = tuple(int(c) + 1 for c in cells)  # type: ignore[assignment]
         self.values = np.zeros(self.shape, np.float32)
         self.known = np.zeros(self.shape, bool)  # evaluated, or empty by definition
-        self.inside = self._inside_hull()
+        self.inside = self._inside()
         self.known[~self.inside] = True
         self.num_evaluated = 0
 
@@ -167,8 +167,8 @@ class GridSampler:
             self._scene.box_min.device
         )
 
-    def _inside_hull(self) -> np.ndarray:
-        """Which points lie inside the hull and off the outermost layer, (X, Y, Z) bool."""
+    def _inside(self) -> np.ndarray:
+        """Which points may have a density and lie off the outermost layer, (X, Y, Z) bool."""
         inside = np.zeros(self.shape, bool)
         inside[1:-1, 1:-1, 1:-1] = True
         for x in range(1, self.shape[0] - 1):

@@ -61,7 +61,7 @@ class ViewMaps:
         hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
             without a hull or where
             they lie beside the colours.
-        hull_size: Width and height of the hull's maps.
+        hull_size: Width and height of the hull's maps; zeros without a hull.
         sections: The hull's cross-sections, None where the model does not read them.
     """
 
@@ -166,10 +166,10 @@ class ViewMaps:
 
     def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
-        if seen.shape[-1] > 4:
-            return seen[..., -2], seen[..., -1]
-        if self.hull_rows is None:
+        if self.hull_size == (0, 0):
             return None, None
+        if self.hull_rows is None:
+            return seen[..., -2], seen[..., -1]
         width, height = self.hull_size
         own = bilinear_rows(shares * shares.new_tensor(self.hull_size), width=width, height=height)
         front, edge = read_rows(self.hull_rows, *own).unflatten(0, seen.shape[:2]).unbind(-1)

@@ -126,8 +126,7 @@ class AbstractRenderer(ABC):
         t_vals = occupied_to_t(seen.t_edges, seen.occupied, s_vals)
         points = points_along(seen.rays, t_vals)
         dirs = seen.rays.directions[:, None].expand_as(points)
-        inside = (seen.length > 0)[:, None].expand_as(t_vals)
-        inside = inside & may_hold(scene, points)
+        inside = (seen.length > 0)[:, None] & may_hold(scene, points)
         chunk = chunk_size(self.memory_mib, scene.bytes_a_point)
         if not torch.is_grad_enabled():  # each chunk would give the maps a dense gradient of its own
             chunk = min(chunk, self.points_at_once, points_in_caches(scene.bytes_a_point))

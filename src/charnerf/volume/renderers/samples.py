@@ -27,7 +27,6 @@ class Samples:
         self.scene = scene
         self.rays = rays
         self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.bytes_a_point))
-        self.num_evaluated = 0
         self.num_colours = 0
         self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
         self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
@@ -37,6 +36,11 @@ class Samples:
     def __len__(self) -> int:
         """Samples whose density is known."""
         return len(self._densities) - 1
+
+    @property
+    def num_evaluated(self) -> int:
+        """Samples that the field was asked for."""
+        return sum(len(answer.densities) for _, answer in self._answers)
 
     def add(self, rows: Tensor, t_vals: Tensor, wanted: Tensor) -> Tensor:
         """Find densities of samples of some rays: evaluated where the scene may hold something, else zero.
@@ -55,20 +59,20 @@ class Samples:
         points = torch.addcmul(self.rays.origins[ray], directions, t_vals[row, column, None])
         start, count, found = len(self), len(points), []
         held = may_hold(self.scene, points)
-        order = torch.cat(
-            (held.nonzero()[:, 0], (~held).nonzero()[:, 0])
-        )  # no colour of the latter is ever wanted
-        asked = order[: int(held.sum())]
-        for first, some in zip(range(0, len(asked), self.size), asked.split(self.size), strict=False):
+        asked, empty = held.nonzero()[:, 0], (~held).nonzero()[:, 0]
+        for first in range(0, len(asked), self.size):
+            some = asked[first : first + self.size]
             answer = self.scene.answer_densities(points[some], directions[some])
             self._answers.append((start + first, answer))
             found.append(answer.densities)
-        self.num_evaluated += len(asked)
-        found.append(self._densities.new_zeros(count - len(asked)))
+        found.append(self._densities.new_zeros(len(empty)))
         self._densities = torch.cat((self._densities[:-1], *found, self._densities[-1:]))
         self._rgb = torch.cat((self._rgb[:-1], self._rgb.new_full((count + 1, 3), UNKNOWN)))
         self._known = torch.cat((self._known[:-1], self._known.new_zeros(count + 1)))
         numbers = torch.full_like(wanted, -1, dtype=torch.long)
+        order = torch.cat(
+            (asked, empty)
+        )  # no answer holds the colours of the latter: a weight of zero asks for none
         numbers[row[order], column[order]] = torch.arange(start, start + count, device=numbers.device)
         return numbers
 
