@@ -132,6 +132,32 @@ def test_chunks_change_nothing(person_scene, kind):
     assert pieces.left_out == whole.left_out
 
 
+@pytest.mark.parametrize("quadrature", [PiecewiseConstant, PiecewiseLinear])
+@pytest.mark.parametrize("density", [0.0, 1e-30, 0.3, 5.0, 300.0, 1e30])
+def test_what_opaque_surface_hides_is_not_asked_and_no_pixel_changes(density, quadrature):
+    """From vacuum to a wall; with a gradient every sample inside is asked, since what hides may change."""
+    asked = []
+
+    def counted(points, dirs):
+        asked.append(len(points))
+        return ball_field(density)(points, dirs)
+
+    rays, settings = rays_of(size=20), {"quadrature": quadrature(), "num_coarse": 24}
+    scene = scene_of(counted, hull=box_hull((-1.0, -1.0, 0.0), (1.0, 1.0, 2.0)))
+    with torch.no_grad():
+        dense = renderer(DenseRenderer, **settings).render(scene, rays).finest
+        asked.clear()
+        seen = renderer(**settings).render(scene, rays)
+    evaluated = sum(asked)
+    asked.clear()
+    learnt = renderer(**settings).render(scene, rays)
+    assert seen.left_out.samples == seen.left_out.samples_of - evaluated
+    assert (evaluated < 0.8 * sum(asked)) if density >= 300.0 else (evaluated == sum(asked))
+    for name in ("rgb", "opacity", "depth"):
+        torch.testing.assert_close(getattr(seen.finest, name), getattr(dense, name), atol=1e-5, rtol=0)
+        torch.testing.assert_close(getattr(learnt.finest, name), getattr(dense, name), atol=1e-5, rtol=0)
+
+
 def test_what_is_left_out_is_counted_right(person_scene):
     """Against a count by hand: rays that miss, all their samples, and samples outside the hull."""
     _, scene = person_scene(fine=True, hull=True)
@@ -245,7 +271,8 @@ def test_a_camera_gives_a_picture(fine):
     one = renderer()
     scene = scene_of(field, fine=field if fine else None)
     picture = one.render_camera(scene, camera)
-    rays = one.render(scene, pixel_rays(camera, pixel_centres(10, 6).reshape(-1, 2)))
+    with torch.no_grad():
+        rays = one.render(scene, pixel_rays(camera, pixel_centres(10, 6).reshape(-1, 2)))
     assert picture.finest.rgb.shape == (6, 10, 3) and picture.finest.depth.shape == (6, 10)
     assert torch.equal(picture.finest.rgb.reshape(-1, 3), rays.finest.rgb)
     assert (picture.coarse is not None) == fine

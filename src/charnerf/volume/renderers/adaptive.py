@@ -5,6 +5,7 @@ until nothing behind can be seen; colours only of samples that count; an estimat
 bins with large errors cut into three, their samples kept, until the estimate is below the tolerance.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
@@ -204,10 +205,16 @@ class AdaptiveRenderer(AbstractRenderer):
         )
 
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
+        self,
+        field: FieldFunction,
+        points: Tensor,
+        dirs: Tensor,
+        inside: Tensor,
+        chunk: int,
+        passed: Callable[[Tensor], Tensor],
     ) -> tuple[FieldOutput, int]:
         """As the culled renderer."""
-        return self._culled._evaluate(field, points, dirs, inside, chunk)
+        return self._culled._evaluate(field, points, dirs, inside, chunk, passed)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ interval in the box counts.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -130,8 +131,16 @@ class AbstractRenderer(ABC):
         chunk = chunk_size(self.memory_mib, scene.bytes_a_point)
         if not torch.is_grad_enabled():  # each chunk would give the maps a dense gradient of its own
             chunk = min(chunk, self.points_at_once, points_in_caches(scene.bytes_a_point))
-        answer, evaluated = self._evaluate(field, points, dirs, inside, chunk)
-        weights, _ = self.quadrature.weights(answer.densities, s_vals, self._edges(seen, s_vals))
+        s_edges = self._edges(seen, s_vals)
+        answer, evaluated = self._evaluate(
+            field,
+            points,
+            dirs,
+            inside,
+            chunk,
+            lambda found: self.quadrature.weights(found, s_vals, s_edges)[1],
+        )
+        weights, _ = self.quadrature.weights(answer.densities, s_vals, s_edges)
         far = seen.t_edges[:, -1]
         output = RenderOutput(
             rgb=composite(weights, answer.rgb, weights.new_tensor(WHITE)),
@@ -143,11 +152,24 @@ class AbstractRenderer(ABC):
 
     @abstractmethod
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
+        self,
+        field: FieldFunction,
+        points: Tensor,
+        dirs: Tensor,
+        inside: Tensor,
+        chunk: int,
+        passed: Callable[[Tensor], Tensor],
     ) -> tuple[FieldOutput, int]:
         """Answers at samples (R, S, 3), zero density where not inside (R, S); and how many were evaluated.
 
-        At most `chunk` points are evaluated at once.
+        Args:
+            field: What answers.
+            points: Samples, (R, S, 3), m, front to back.
+            dirs: Along which they are looked at, (R, S, 3).
+            inside: Which may have a density, (R, S) bool.
+            chunk: Points to evaluate at once, at most.
+            passed: From densities (R, S) to the share of light that passes all samples, (R,); it falls with any density, so that
+                samples which are not known yet may stand as zeros.
         """
 
     def _edges(self, seen: OccupiedRays, s_vals: Tensor) -> Tensor:

@@ -1,5 +1,6 @@
 """Evaluates every sample of every ray and applies the hull afterwards: the reference."""
 
+from collections.abc import Callable
 from typing import final
 
 import torch
@@ -21,7 +22,13 @@ class DenseRenderer(AbstractRenderer):
         )
 
     def _evaluate(
-        self, field: FieldFunction, points: Tensor, dirs: Tensor, inside: Tensor, chunk: int
+        self,
+        field: FieldFunction,
+        points: Tensor,
+        dirs: Tensor,
+        inside: Tensor,
+        chunk: int,
+        passed: Callable[[Tensor], Tensor],
     ) -> tuple[FieldOutput, int]:
         """Evaluate all samples, then set the density outside to zero."""
         answer = self._in_chunks(field, points.reshape(-1, 3), dirs.reshape(-1, 3), chunk)
