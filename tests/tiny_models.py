@@ -80,9 +80,9 @@ def double() -> DoubleHourglass:
     )
 
 
-def f1(name: str, *, num_extras: int = 0, num_blocks: int = 1) -> AbstractSingleView:
+def f1(name: str, *, num_extras: int = 0, num_blocks: int = 1, width: int = WIDTH) -> AbstractSingleView:
     """f1 by its option's name."""
-    sizes = {"width": WIDTH, "num_extras": num_extras, "num_blocks": num_blocks}
+    sizes = {"width": width, "num_extras": num_extras, "num_blocks": num_blocks}
     if name == "camera":
         return CameraSingleView(**sizes, octaves=2, factor=1.5)
     return WorldSingleView(**sizes, num_frequencies=FREQUENCIES)
@@ -98,6 +98,8 @@ def tiny_model(
     single_view: str = "world",
     fine: bool = False,
     hull: bool = True,
+    width: int = WIDTH,
+    num_blocks: int = 1,
 ) -> CharNeRF:
     """A model of a few thousand parameters; the names are those of the config's options."""
     encoder = single()
@@ -111,14 +113,14 @@ def tiny_model(
 
     def field() -> Field:
         return Field(
-            single_view=f1(single_view, num_extras=inputs.num_extras),
-            combinator=combinator(combining),
-            density=DENSITIES[density](width=WIDTH),
-            head=BlendHead(width=WIDTH, hidden=8) if head == "blend" else RadianceHead(width=WIDTH),
+            single_view=f1(single_view, num_extras=inputs.num_extras, num_blocks=num_blocks, width=width),
+            combinator=combinator(combining, width=width),
+            density=DENSITIES[density](width=width),
+            head=BlendHead(width=width, hidden=8) if head == "blend" else RadianceHead(width=width),
             activation=ShiftedSoftplus(shift=-1.0, scale=20.0),
             feature_channels=encoder.out_channels,
-            width=WIDTH,
-            num_multi_view_blocks=1,
+            width=width,
+            num_multi_view_blocks=num_blocks,
         )
 
     return CharNeRF(

@@ -130,8 +130,27 @@ def test_a_run_begins_with_the_weights_of_another(run_folder, figure_dataset, tm
         torch.testing.assert_close(model.state_dict()[name], value, rtol=0.0, atol=0.0)
 
 
-def test_weights_of_another_model_are_refused_before_work_starts(run_folder, figure_dataset, tmp_path):
-    cfg = small_runs.smoke_config(figure_dataset, f"start_from={run_folder}", "scale.width=24")
+def test_a_run_begins_with_the_weights_of_a_narrower_one(run_folder, figure_dataset, tmp_path):
+    settings = (
+        "encoder=single",
+        "model.width=24",
+        "model.num_multi_view_blocks=2",
+        f"start_from={run_folder}",
+    )
+    cfg = small_runs.smoke_config(figure_dataset, *settings)
+    model = build_model(cfg)
+    assert "grown from model.width=16 model.num_multi_view_blocks=1" in begin(model, cfg)
+    mine, its = model.state_dict(), load(run_folder).network.state_dict()
+    name = "coarse.multi_view.blocks.0.first.weight"
+    torch.testing.assert_close(mine[name][:16, :16], its[name], rtol=0.0, atol=0.0)
+
+
+@pytest.mark.parametrize("change", ["scale.width=12", "scale.width=24"])
+def test_weights_of_another_model_are_refused_before_work_starts(
+    run_folder, figure_dataset, tmp_path, change
+):
+    """Narrower, or with another encoder too."""
+    cfg = small_runs.smoke_config(figure_dataset, f"start_from={run_folder}", change)
     with pytest.raises(
         ConfigError, match=r"start_from: found the weights of another model.*model\.width=16 encoder=single "
     ):

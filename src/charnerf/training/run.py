@@ -14,7 +14,6 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard.summary import hparams
 
-from charnerf.config import MODEL_SECTIONS
 from charnerf.data.characters import Character, load_character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.layout import names_of, read_dataset
@@ -26,19 +25,19 @@ from charnerf.errors import ConfigError
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.matrix_products import use_fastest_products
-from charnerf.runs import build_model, build_part, build_renderer, load, save_config, save_weights
+from charnerf.runs import build_model, build_part, build_renderer, save_config, save_weights
 from charnerf.training.averaging import WeightAverage
 from charnerf.training.clock import RunClock
 from charnerf.training.finish import finish_run
 from charnerf.training.guards import FiniteGuard, WhiteAlarm
 from charnerf.training.module import TrainingModule
 from charnerf.training.monitor import BudgetBar, CurveWriter, PictureLogger
+from charnerf.training.start import begin
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
 START_FILE = "start.txt"  # where the weights of a run began, if that was not random
 CHECKPOINT_EVERY = timedelta(minutes=5)  # at least; validations write checkpoints too
-NETWORK_SECTIONS = [name for name in MODEL_SECTIONS if name not in ("quadrature", "renderer")]
 SURFACE_TERMS = ("surface_rgb", "surface_alpha")
 HYPER_METRICS = ("val/psnr", "val/psnr_foreground", "val/ssim")  # columns beside the hyper-parameters
 
@@ -92,40 +91,6 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     if trainer.is_global_zero:
         save_weights(folder / "weights.safetensors", model, cfg)
         finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
-
-
-def begin(model: CharNeRF, cfg: DictConfig) -> str | None:
-    """Give a new run's model the weights that it begins with; says which, None where they are random.
-
-    Raises:
-        ConfigError: If the weights of `start_from` are those of another model.
-    """
-    if cfg.start_from is None:
-        return model.encoder.begin()
-    source = load(
-        None if cfg.start_from == "released" else cfg.start_from, trusted_targets=cfg.trusted_targets
-    )
-    try:
-        model.load_state_dict(source.network.state_dict())
-    except RuntimeError as error:
-        raise ConfigError(
-            f"start_from: found the weights of another model in {source.source}, expected this run's. To make them the same: "
-            f"{' '.join(settings_of(source.config, unlike=cfg))}"
-        ) from error
-    return f"Began with the weights of {source.source}."
-
-
-def settings_of(model: DictConfig, *, unlike: DictConfig) -> list[str]:
-    """Overrides that give a run the networks of another model's config: an option is named as its file is."""
-    found = []
-    for section in NETWORK_SECTIONS:
-        for key, value in model[section].items():
-            if OmegaConf.select(unlike, f"{section}.{key}") == value:
-                continue
-            found.append(
-                f"{section}={value.split('.')[-2]}" if key == "_target_" else f"{section}.{key}={value}"
-            )
-    return found
 
 
 def check_data(root: Path, sampling: DictConfig, size: int) -> None:
