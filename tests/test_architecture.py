@@ -69,7 +69,15 @@ WITHIN_A_LAYER = {  # beside the first and the last layer, where rooms may impor
 }
 ONLY_IN = {  # foreign package: where it may be imported
     "hydra": ("config", "runs"),
-    "omegaconf": ("config", "runs", "commands", "training/run", "training/start", "training/finish", "training/cells"),
+    "omegaconf": (
+        "config",
+        "runs",
+        "commands",
+        "training/run",
+        "training/start",
+        "training/finish",
+        "training/cells",
+    ),
     "lightning": ("training", "data/datamodule"),
     "typer": ("cli", "cli_card", "cli_drawings", "cli_meshes", "cli_finetune", "cli_options"),
 }

@@ -10,7 +10,7 @@ from charnerf.types import FieldFunction, FieldOutput, LeftOut, RayBundle, Rende
 from charnerf.volume.renderers.base import WHITE, AbstractRenderer
 
 UNSEEN = 1e-6  # of the light: a sample that less of it reaches is not seen; a colour in float32 is rounded to a tenth of that
-STAGES = 4  # in which a ray is evaluated, front to back; more would leave out little more and cost calls
+MOST_STAGES = 4  # in which a ray is evaluated, front to back; more would leave out little more
 
 
 @final
@@ -47,7 +47,9 @@ class CulledRenderer(AbstractRenderer):
     ) -> tuple[FieldOutput, int]:
         """Pack the samples that count, evaluate them, and put them back among zeros, stage by stage."""
         num_samples, evaluated = inside.shape[1], 0
-        stage = num_samples if torch.is_grad_enabled() else -(-num_samples // STAGES)
+        # a stage of less than a chunk costs its calls more than it spares
+        chunks = 1 if torch.is_grad_enabled() else int(inside.sum()) // min(chunk, self.points_at_once)
+        stage = -(-num_samples // max(1, min(MOST_STAGES, chunks)))
         order = torch.arange(num_samples, device=inside.device)
         rgb, densities = torch.zeros_like(points).reshape(-1, 3), points.new_zeros(inside.numel())
         for start in range(0, num_samples, stage):
