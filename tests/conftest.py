@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import torch
 
-import helpers
 from charnerf.types import SourceViews
+from support import helpers
 
 ROOT = Path(__file__).resolve().parents[1]
 OPT_IN = {"gpu": "CHARNERF_TEST_GPU", "blender": "CHARNERF_TEST_BLENDER", "slow": "CHARNERF_TEST_SLOW"}

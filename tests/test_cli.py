@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from charnerf import runs
 from charnerf.cli import run
 from charnerf.config.composition import compose_config, run_door
 from charnerf.errors import ConfigError, DataError
+from charnerf.inference import weights as runs
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = ("capture", "generate", "evaluate", "mesh", "reconstruct", "report")

@@ -7,10 +7,10 @@ import pytest
 from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf, open_dict
 
-from charnerf import runs
 from charnerf.config import complete_model, validate, validate_model
 from charnerf.config.composition import check_command_line, compose_config
 from charnerf.errors import ConfigError
+from charnerf.inference import weights as runs
 
 ROOT = Path(__file__).resolve().parents[1]
 OPTIONS = sorted(file.relative_to(ROOT / "conf") for file in (ROOT / "conf").glob("*/*.yaml"))
@@ -165,8 +165,8 @@ def test_what_is_missing_is_named() -> None:
         "builtins.eval",
         "subprocess.Popen",
         "charnerf.cli.sys.exit",
-        "charnerf.runs.os.system",
-        "charnerf.runs.load",
+        "charnerf.inference.weights.os.system",
+        "charnerf.inference.weights.load",
         "torch.optim.Adam",
         "torch.hub.load",
         "lightning.Trainer",

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from omegaconf import OmegaConf
 
-from charnerf import runs
 from charnerf.config.composition import compose_config
+from charnerf.inference import weights as runs
 from charnerf.training.run import reads
 
 ROOT = Path(__file__).resolve().parents[1]

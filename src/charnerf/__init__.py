@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from charnerf.errors import (
         ShapeError as ShapeError,
     )
+    from charnerf.inference.model import Hero as Hero
+    from charnerf.inference.model import Model as Model
+    from charnerf.inference.weights import load as load
+    from charnerf.inference.weights import save_weights as save_weights
     from charnerf.meshing.export import save_mesh as save_mesh
-    from charnerf.model_api import Hero as Hero
-    from charnerf.model_api import Model as Model
-    from charnerf.runs import load as load
-    from charnerf.runs import save_weights as save_weights
 
 # Before torch starts its threads: on busy cores threads that spin for one another take the time that those waited for need.
 # A hundred thousand turns: fewer cost time on idle cores, see docs/benchmarks.md.
@@ -49,11 +49,11 @@ except PackageNotFoundError:  # a checkout on the path, not installed
     __version__ = "0+unknown"
 
 _HOMES = {
-    "load": "charnerf.runs",
-    "save_weights": "charnerf.runs",
+    "load": "charnerf.inference.weights",
+    "save_weights": "charnerf.inference.weights",
     "save_mesh": "charnerf.meshing.export",
-    "Model": "charnerf.model_api",
-    "Hero": "charnerf.model_api",
+    "Model": "charnerf.inference.model",
+    "Hero": "charnerf.inference.model",
     "CharNeRFError": "charnerf.errors",
     "ConfigError": "charnerf.errors",
     "DataError": "charnerf.errors",

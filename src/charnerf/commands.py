@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal
 import torch
 from omegaconf import OmegaConf
 
-from charnerf import runs
 from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.lights import Headlight, Unlit
@@ -23,9 +22,10 @@ from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.geometry.resizing import resized_cameras
+from charnerf.inference import weights as runs
+from charnerf.inference.model import Model, TextureKind
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.lod import lod_table
-from charnerf.model_api import Model, TextureKind
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
 from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.reporting.report import report as write_report
@@ -129,7 +129,7 @@ def generate(
     output: Path, *, train: int, val: int, test: int, seed: int, views: int, size: int, jobs: int | None
 ) -> None:
     """Write the embedded characters."""
-    from charnerf.capture.procedural.dataset import generate_dataset
+    from charnerf.capture.procedural_data import generate_dataset
 
     if train + val + test == 0:
         raise ConfigError("--train, --val, --test: found 0 each, expected at least one character.")
@@ -376,7 +376,7 @@ def _checked_character(model: Model, data: Path | None, character: str | None) -
         known = load_character(data, character or names[0])
         return known.sources, _small(known.cameras[0])
     from charnerf.capture.embree import capture_character
-    from charnerf.capture.procedural.character import make_character
+    from charnerf.procedural.character import make_character
 
     options = CaptureOptions(views=3, size=model.image_size, light=Unlit())
     pictures = capture_character(make_character(CHECKED_SEED), options).pictures

@@ -10,8 +10,6 @@ import pytest
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
-import helpers
-import tiny_models
 from charnerf.bench.baseline import PixelAligned, PixelNeRFLike
 from charnerf.bench.everything import turned
 from charnerf.bench.grids import grid_share, hausdorff
@@ -31,6 +29,7 @@ from charnerf.bench.workbench import settings_of
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
 
 CPU = torch.device("cpu")
 LIKE = {

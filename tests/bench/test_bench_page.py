@@ -8,8 +8,6 @@ from types import SimpleNamespace
 import pytest
 import torch
 
-import helpers
-import tiny_models
 from charnerf.bench import run as benchmark
 from charnerf.bench.everything import PARTS
 from charnerf.bench.page import BEGIN, END, SECTIONS, write_page
@@ -24,6 +22,7 @@ from charnerf.bench.training_step import compared_curves, loss_curves
 from charnerf.errors import ConfigError, DataError
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
 
 STEPS = [
     {

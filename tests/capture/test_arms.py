@@ -6,8 +6,8 @@ import trimesh
 
 from charnerf.capture.arms import find_arms, lower_arms
 from charnerf.capture.outline import middle_runs
-from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.errors import DataError
+from charnerf.surfaces.scene_mesh import surface_of_scene
 
 TRUNK, SHOULDER, REACH = 0.3, 1.4, 1.2  # half width, height of the arms, m
 

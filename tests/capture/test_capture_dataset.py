@@ -6,8 +6,8 @@ from charnerf.capture.dataset import capture_dataset, capture_scene_to
 from charnerf.capture.embree import CaptureOptions
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
-from charnerf.data.mesh_files import load_surface_mesh
 from charnerf.errors import ConfigError, DataError
+from charnerf.surfaces.mesh_files import load_surface_mesh
 
 TINY = CaptureOptions(views=2, size=16)
 

@@ -6,10 +6,10 @@ from PIL import Image
 
 from charnerf.capture.embree import CaptureOptions, capture_character
 from charnerf.capture.lights import Headlight
-from charnerf.data.raycast import RayCaster
-from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import angles_from_direction, project
+from charnerf.surfaces.raycast import RayCaster
+from charnerf.surfaces.scene_mesh import surface_of_scene
 
 SMALL = {"views": 3, "size": 48}
 

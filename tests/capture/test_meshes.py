@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from charnerf.capture.meshes import axes_rotation, load_scene
-from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.errors import ConfigError, DataError
+from charnerf.surfaces.scene_mesh import surface_of_scene
 
 
 def body(up, front):

@@ -8,9 +8,9 @@ from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.part_swaps import Figure, slab, swap_parts
 from charnerf.data.layout import read_dataset
-from charnerf.data.scene_mesh import surface_of_scene
-from charnerf.data.surface_mesh import SurfaceMesh, shade, triangle_areas
 from charnerf.errors import DataError
+from charnerf.surfaces.scene_mesh import surface_of_scene
+from charnerf.surfaces.surface_mesh import SurfaceMesh, shade, triangle_areas
 
 
 def figure(color, *, neck=1.55, hips=0.8, wide=1.8, fine=1):

@@ -6,8 +6,8 @@ from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.variants import variant
 from charnerf.data.layout import read_dataset
-from charnerf.data.mesh_files import load_surface_mesh
-from charnerf.data.scene_mesh import surface_of_scene
+from charnerf.surfaces.mesh_files import load_surface_mesh
+from charnerf.surfaces.scene_mesh import surface_of_scene
 
 
 def standing_capsule():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from charnerf.data.color import linear_from_bytes, linear_from_srgb, srgb_from_linear
+from charnerf.surfaces.color import linear_from_bytes, linear_from_srgb, srgb_from_linear
 
 
 def test_half_the_light_is_188():

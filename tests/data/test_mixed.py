@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 import torch
 
-import helpers
 from charnerf.data.augmentation import NoAugmentation
 from charnerf.data.mixed import MixedDataset, stack_views
 from charnerf.data.sampler import BatchRequest
@@ -22,6 +21,7 @@ from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
 from charnerf.geometry.hull import build_hull, occupied_edges
 from charnerf.models.views.turnaround import Turnaround
 from charnerf.types import SourceViews, TrainBatch
+from support import helpers
 
 NAMES = ("lefty", "mirror")
 FIGURES = {"lefty": helpers.person(symmetric=False), "mirror": helpers.person()}

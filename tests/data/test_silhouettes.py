@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-import helpers
 from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
 from charnerf.geometry.hull import build_hull, hull_contains
+from support import helpers
 
 RADIUS = 0.8
 

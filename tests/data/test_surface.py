@@ -5,11 +5,11 @@ import trimesh
 from PIL import Image
 from scipy import stats
 
-from charnerf.data.mesh_files import load_surface_mesh, write_surface_mesh
-from charnerf.data.scene_mesh import COLORS_KEY, FACTOR_KEY, surface_of_scene
 from charnerf.data.surface import AreaSurface, VisibleSurface, visible_surface_points
-from charnerf.data.surface_mesh import SurfaceMaterial, SurfaceMesh, interpolate, shade, triangle_areas
 from charnerf.errors import DataError
+from charnerf.surfaces.mesh_files import load_surface_mesh, write_surface_mesh
+from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, surface_of_scene
+from charnerf.surfaces.surface_mesh import SurfaceMaterial, SurfaceMesh, interpolate, shade, triangle_areas
 
 
 def plain_mesh(triangles, factor=(1.0, 1.0, 1.0, 1.0), cutoff=None):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import torch
-from painted import cropped, noisy_paper, on_background, paint
 from PIL import Image
 
 from charnerf.drawings.cutout import cut_out
@@ -11,6 +10,7 @@ from charnerf.drawings.load import drawing_from_array
 from charnerf.drawings.turnaround import read_turnaround, silhouette_iou
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import angles_from_direction, project
+from support.painted import cropped, noisy_paper, on_background, paint
 
 VIEWS = ("front", "side", "back")
 SIZE = 128

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from figures import write_figure
+from support.figures import write_figure
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@ import math
 import pytest
 import torch
 
-import tiny_models
 from charnerf.data.characters import load_character
 from charnerf.errors import ConfigError
 from charnerf.evaluation.attention import (
@@ -17,6 +16,7 @@ from charnerf.geometry.safe import safe_normalize
 from charnerf.models.combinators.view_attention import ViewAttention
 from charnerf.volume.quadrature.constant import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
+from support import tiny_models
 
 WIDTH, HEADS, POINTS, VIEWS = 12, 3, 9, 4
 

@@ -7,7 +7,7 @@ from charnerf.evaluation.ray_mesh import RayMesh
 from charnerf.evaluation.scores import on_white
 from charnerf.evaluation.surface_error import seen_points, surface_scores
 from charnerf.types import SourceViews
-from figures import SIZE, figure, photograph, source_views, target_cameras
+from support.figures import SIZE, figure, photograph, source_views, target_cameras
 
 
 @pytest.fixture(scope="module", params=["ball", "doll"])

@@ -17,7 +17,7 @@ from charnerf.evaluation.angles import azimuth_bin, view_angles
 from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
 from charnerf.evaluation.scores import METRIC_KEYS, on_white
 from charnerf.types import LeftOut, RenderOutput
-from figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
+from support.figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
 
 
 def make_mesh(scene, views):

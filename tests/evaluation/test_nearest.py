@@ -12,7 +12,7 @@ from charnerf.evaluation.baselines import VisualHullBaseline
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.nearest import NearestBaseline, TrainingCharacters, filled_drawings
 from charnerf.evaluation.scores import METRIC_KEYS, on_white
-from figures import HullModel, HullRenderer, WhiteRenderer, write_figure
+from support.figures import HullModel, HullRenderer, WhiteRenderer, write_figure
 
 
 @pytest.fixture(scope="module")

@@ -8,17 +8,16 @@ import pytest
 import torch
 from omegaconf import OmegaConf
 
-import helpers
-import tiny_models
 from charnerf.errors import ConfigError, DataError
 from charnerf.finetuning import Recipe, finetune
 from charnerf.finetuning.finetune import learning_parts
 from charnerf.finetuning.known import finest, know, place, render_known
 from charnerf.finetuning.regions import held_out_patches
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.model_api import Model
+from charnerf.inference.model import Model
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
 
 QUICK = Recipe(seconds=60.0, most_steps=10, check_every=5, rays=128, novel_rays=32, learning_rate=3e-3)
 

@@ -8,12 +8,12 @@ import torch
 from PIL import Image
 
 import charnerf
-from charnerf import runs
 from charnerf.cli import run
 from charnerf.config.composition import compose_config
 from charnerf.finetuning import Recipe, finetune
 from charnerf.finetuning.report import write_finetuned
-from charnerf.model_api import Model
+from charnerf.inference import weights as runs
+from charnerf.inference.model import Model
 
 QUICK = Recipe(
     seconds=60.0,

@@ -5,7 +5,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import helpers
 from charnerf.errors import ShapeError
 from charnerf.geometry.cameras import (
     angles_from_direction,
@@ -22,6 +21,7 @@ from charnerf.geometry.cameras import (
     to_camera_frame,
 )
 from charnerf.types import Cameras
+from support import helpers
 
 SETTINGS = settings(deadline=None, max_examples=40, database=None, derandomize=True)
 CENTRE = torch.tensor((0.0, 0.0, 1.0), dtype=torch.float64)

@@ -2,10 +2,10 @@
 
 import torch
 
-import helpers
 from charnerf.geometry.cross_sections import cross_sections, read_cross_sections
 from charnerf.geometry.hull import build_hull
 from charnerf.types import Hull
+from support import helpers
 
 
 def hull_of(occupancy: torch.Tensor) -> Hull:

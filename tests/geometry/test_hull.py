@@ -7,12 +7,12 @@ from functools import cache
 import pytest
 import torch
 
-import helpers
 from charnerf.errors import DataError
 from charnerf.geometry import hull as hull_module
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all
 from charnerf.geometry.hull import build_hull, hull_contains, occupied_edges
 from charnerf.types import Hull, RayBundle, SourceViews
+from support import helpers
 
 BOX_MIN, BOX_MAX = torch.tensor((-1.8, -1.8, -0.8)), torch.tensor((1.8, 1.8, 2.8))
 FIGURES = {

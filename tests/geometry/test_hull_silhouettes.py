@@ -3,11 +3,11 @@
 import pytest
 import torch
 
-import helpers
 from charnerf.geometry.cameras import cameras_towards, fibonacci_hemisphere, pixel_centres, pixel_rays
 from charnerf.geometry.hull import build_hull, occupied_edges
 from charnerf.geometry.silhouettes import hull_silhouettes
 from charnerf.types import Hull
+from support import helpers
 
 BOX_MIN, BOX_MAX = torch.tensor((-1.8, -1.8, -0.8)), torch.tensor((1.8, 1.8, 2.8))
 

@@ -3,11 +3,11 @@
 import pytest
 import torch
 
-import helpers
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import build_hull, occupied_edges
 from charnerf.geometry.occupied import candidates, coarse_occupancy, segment_bins
 from charnerf.types import Hull, RayBundle
+from support import helpers
 
 
 @pytest.mark.parametrize("seed", range(4))

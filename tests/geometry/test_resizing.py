@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import torch
 
-import helpers
 from charnerf.geometry.cameras import project
 from charnerf.geometry.resizing import resized_cameras, resized_views
+from support import helpers
 
 
 def test_a_resized_camera_sees_the_same():

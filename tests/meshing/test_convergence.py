@@ -5,17 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-from analytic_scenes import figure, scene_of, sphere
 
 from charnerf.geometry.cameras import cameras_towards
+from charnerf.inference.model import Hero
 from charnerf.meshing.convergence import (
     convergence_lines,
     direction_spread,
     measure_convergence,
 )
-from charnerf.model_api import Hero
 from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.types import Scene, SourceViews
+from support.analytic_scenes import figure, scene_of, sphere
 
 
 def _directed(strength: float):

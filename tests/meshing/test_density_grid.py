@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-from analytic_scenes import box_hull, figure, scene_of, sphere
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.meshing.density_grid import GridSampler, averaged_density, camera_positions
 from charnerf.meshing.extract import extract_surface
 from charnerf.types import FieldOutput
+from support.analytic_scenes import box_hull, figure, scene_of, sphere
 
 
 def _hull_around(distance, margin: float, cells: int = 64):

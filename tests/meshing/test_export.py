@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from charnerf.data.color import linear_from_srgb
 from charnerf.errors import DataError
 from charnerf.meshing.export import SUFFIXES, save_mesh
+from charnerf.surfaces.color import linear_from_srgb
 
 Z_UP = (".ply", ".stl")
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from analytic_scenes import capsule, figure, scene_of, sphere
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
@@ -15,6 +14,7 @@ from charnerf.meshing.calibrate import LEVELS, choose_level
 from charnerf.meshing.density_grid import DensityGrid, GridSampler
 from charnerf.meshing.extract import drop_floaters, extract_surface, fit_height, simplify
 from charnerf.types import LeftOut, SourceViews
+from support.analytic_scenes import capsule, figure, scene_of, sphere
 
 CENTRE = np.array([0.03, -0.07, 1.02])
 

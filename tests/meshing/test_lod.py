@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from analytic_scenes import scene_of, sphere
 
 from charnerf.errors import DataError
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.lod import build_lods, lod_report, lod_table, named, num_parts
+from support.analytic_scenes import scene_of, sphere
 
 
 def _ball(radius: float, detail: int = 4) -> trimesh.Trimesh:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import trimesh
-from analytic_scenes import figure, scene_of, sphere
 
 from charnerf.errors import DataError
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import extract_surface
 from charnerf.meshing.smooth import smooth_mesh
+from support.analytic_scenes import figure, scene_of, sphere
 
 CENTRE = np.array([0.03, -0.07, 1.02])
 

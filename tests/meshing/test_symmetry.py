@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-from analytic_scenes import box_hull, capsule, figure, scene_of
 
 from charnerf.geometry.hull import hull_contains
 from charnerf.meshing.density_grid import GridSampler, averaged_density
@@ -13,6 +12,7 @@ from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.extract import extract_surface
 from charnerf.meshing.symmetry import symmetric_hull, symmetric_scene
 from charnerf.types import Scene
+from support.analytic_scenes import box_hull, capsule, figure, scene_of
 
 
 def _lopsided(points: torch.Tensor) -> torch.Tensor:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from analytic_scenes import scene_of, sphere
 
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
@@ -17,6 +16,7 @@ from charnerf.meshing.parts import parts_of, read_texture, texture_picture, weld
 from charnerf.meshing.projection import Projector
 from charnerf.meshing.texture import Texturing, padded_picture, texture_mesh
 from charnerf.types import SourceViews
+from support.analytic_scenes import scene_of, sphere
 
 MAGENTA = (1.0, 0.0, 1.0)
 FRONT, SIDE, BACK = (0.8, 0.2, 0.1), (0.1, 0.7, 0.2), (0.2, 0.3, 0.9)

@@ -6,8 +6,6 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-import helpers
-import tiny_models
 from charnerf.data.mixed import stack_hulls, stack_views
 from charnerf.errors import ShapeError
 from charnerf.geometry.cameras import project_into_all
@@ -18,6 +16,7 @@ from charnerf.types import FieldOutput, Hull, SourceViews
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
 
 PERSON = helpers.person(symmetric=False)
 

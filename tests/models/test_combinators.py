@@ -6,11 +6,11 @@ from functools import partial
 import pytest
 import torch
 
-import tiny_models
 from charnerf.geometry.safe import safe_normalize
 from charnerf.models.combinators.base import masked_logits, view_weights
 from charnerf.models.combinators.self_attention import SelfAttention
 from charnerf.models.combinators.view_attention import ViewAttention
+from support import tiny_models
 
 WIDTH, HEADS, POINTS = 12, 2, 7
 NAMES = tiny_models.COMBINATORS

@@ -5,12 +5,11 @@ from dataclasses import replace
 import pytest
 import torch
 
-import helpers
-import tiny_models
 from charnerf.errors import ShapeError
+from charnerf.inference.model import AnySize, fitted
 from charnerf.meshing.symmetry import symmetric_scene
-from charnerf.model_api import AnySize, fitted
 from charnerf.types import SourceViews
+from support import helpers, tiny_models
 
 SMALL, LARGE = 32, 128
 

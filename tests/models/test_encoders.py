@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-import tiny_models
 from charnerf.models.encoders.hourglass import StackedHourglass, group_norm
+from support import tiny_models
 
 ENCODERS = {
     "single": tiny_models.single,

@@ -5,10 +5,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import tiny_models
 from charnerf.errors import ShapeError
 from charnerf.geometry.safe import safe_normalize
 from charnerf.models.growth import grow_from
+from support import tiny_models
 
 
 def pair(*, width: int = 20, num_blocks: int = 2, **options) -> tuple[torch.nn.Module, torch.nn.Module]:

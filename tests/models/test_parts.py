@@ -5,8 +5,6 @@ from dataclasses import replace
 import pytest
 import torch
 
-import helpers
-import tiny_models
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import mirror_cameras
 from charnerf.geometry.safe import safe_normalize
@@ -27,6 +25,7 @@ from charnerf.models.views.first import FirstViews
 from charnerf.models.views.mirrored import MirroredSide
 from charnerf.models.views.turnaround import Turnaround
 from charnerf.types import SourceViews
+from support import helpers, tiny_models
 
 WIDTH = tiny_models.WIDTH
 

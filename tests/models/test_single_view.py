@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-import tiny_models
 from charnerf.geometry.safe import safe_normalize
 from charnerf.models.inputs import PointInputs
 from charnerf.models.single_view.camera import CameraSingleView
+from support import tiny_models
 
 WIDTH = tiny_models.WIDTH
 

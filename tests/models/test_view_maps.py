@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import torch
 
-import helpers
 from charnerf.geometry.hull import build_hull
 from charnerf.models.view_maps import ViewMaps, kept_share
 from charnerf.models.views.mirrored import MirroredSide
+from support import helpers
 
 BOX_MIN, BOX_MAX = torch.tensor((-1.8, -1.8, -0.8)), torch.tensor((1.8, 1.8, 2.8))
 RADIUS = 0.5

@@ -14,8 +14,8 @@ from PIL import Image, ImageDraw
 from charnerf.drawings.turnaround import read_turnaround
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.hull import build_hull
+from charnerf.inference.model import Hero
 from charnerf.meshing.parts import read_texture
-from charnerf.model_api import Hero
 from charnerf.reconstruction import reconstruct
 from charnerf.types import FieldOutput, Scene
 from charnerf.volume.quadrature import PiecewiseConstant

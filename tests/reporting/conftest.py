@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from charnerf.evaluation.evaluate import evaluate, write_metrics
-from figures import HullModel, HullRenderer, write_figure
+from support.figures import HullModel, HullRenderer, write_figure
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,8 @@
 """No encoder's gradient vanishes or explodes on its way to the first layer at the start of training."""
 
-import encoder_gradients
 import pytest
+
+from support import encoder_gradients
 
 
 @pytest.mark.parametrize("build", [encoder_gradients.single, encoder_gradients.double])

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 import pytest
-import stiff
 import torch
 import trimesh
 
-from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface import AreaSurface
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_rays
+from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.types import RayBundle
+from support import stiff
 
 ALWAYS = (
     "learning rate x 100",

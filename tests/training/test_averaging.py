@@ -1,12 +1,12 @@
 """The average of the weights is what is validated and saved, and a resumed run has the same average."""
 
 import pytest
-import small_runs
 import torch
 
 from charnerf.config.composition import compose_config
 from charnerf.errors import ConfigError
 from charnerf.training.averaging import WeightAverage
+from support import small_runs
 
 DECAY = 0.5
 STEPS = ("loss=opacity", "encoder=single", "scale.steps=6", "sampling.num_validations=3")

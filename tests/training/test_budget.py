@@ -5,8 +5,9 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import small_runs
 import torch
+
+from support import small_runs
 
 SHORT = ("encoder=single", "sampling.train_splits=[val]", "scale.phase_rays=[16,16]")
 

@@ -2,10 +2,10 @@
 
 import logging
 
-import small_runs
 import torch
 
 from charnerf.training import finish
+from support import small_runs
 
 
 def test_a_field_too_thin_for_a_mesh_is_said_and_the_run_goes_on(figure_dataset, tmp_path, caplog):

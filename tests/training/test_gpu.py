@@ -1,10 +1,10 @@
 """What a GPU does: the same run as the CPU's, in float32 and, nearly, in bfloat16. Runs with `-m gpu`."""
 
 import pytest
-import small_runs
 import torch
 
 from charnerf.evaluation.timing import Stopwatch
+from support import small_runs
 
 STEPS = ("scale.steps=4", "sampling.num_validations=2")
 

@@ -10,20 +10,20 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-import small_runs
 import torch
 
 from charnerf.training import run
 from charnerf.training.cells import read_cell, run_cell
+from support import small_runs
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = ("encoder=single", "scale.steps=24", "sampling.num_validations=12")
-ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parent)}
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[1])}
 
 TRAINED = """
     import sys
     from pathlib import Path
-    import small_runs
+    from support import small_runs
     from charnerf.training.cells import run_cell
 
     def train(cfg, folder):

@@ -4,11 +4,11 @@ import logging
 
 import lightning as L
 import pytest
-import small_runs
 import torch
 
 from charnerf.errors import NumericalError
 from charnerf.training.guards import PATIENCE, WhiteAlarm
+from support import small_runs
 
 
 class Poison(L.Callback):

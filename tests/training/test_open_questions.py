@@ -1,11 +1,11 @@
 """Options for what the paper leaves open: a rate for the combinator, directions and delta of surface points."""
 
 import pytest
-import small_runs
 import torch
 
 from charnerf.errors import ConfigError
 from charnerf.training.run import surface_delta
+from support import small_runs
 
 PAPER = ("experiment=charnerf", "encoder=single", "scale.steps=2", "sampling.num_validations=1")
 

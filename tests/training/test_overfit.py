@@ -3,13 +3,12 @@
 import pytest
 import torch
 
-import helpers
-import tiny_models
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.losses.terms import squared_color_error
 from charnerf.types import Hull, RayBundle
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
 
 STEPS = 150
 

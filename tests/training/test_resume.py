@@ -1,7 +1,8 @@
 """A run that is cut off and goes on is the run that was never cut off, bit by bit."""
 
-import small_runs
 import torch
+
+from support import small_runs
 
 TWO_PHASES = (
     "loss=charnerf",

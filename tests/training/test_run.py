@@ -5,16 +5,16 @@ import json
 from pathlib import Path
 
 import pytest
-import small_runs
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from charnerf.errors import ConfigError, DataError
+from charnerf.inference.weights import build_model, load, load_config
 from charnerf.losses.total import TERMS
-from charnerf.runs import build_model, load, load_config
 from charnerf.training.clock import RunClock
 from charnerf.training.module import rate_at
 from charnerf.training.run import begin, find_checkpoint, run_training, surface_delta, training_renderer
+from support import small_runs
 
 STEPS = 40
 

@@ -5,15 +5,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-import small_runs
 from torch import nn
 
-import helpers
 from charnerf.config.composition import compose_config
 from charnerf.errors import DataError
+from charnerf.inference.weights import build_model
 from charnerf.models.encoders.hourglass import Hourglass
 from charnerf.models.mlp import ResidualBlock
-from charnerf.runs import build_model
+from support import helpers, small_runs
 
 ONE = ("sampling.train_splits=[train]", "sampling.val_split=train", "sampling.val_characters=1",
        "sampling.num_validations=1", "encoder=single", "scale.steps=2")  # fmt: skip

@@ -4,10 +4,10 @@ import multiprocessing
 import shutil
 
 import pytest
-import small_runs
 import torch
 
 from charnerf.errors import ConfigError, DataError
+from support import small_runs
 
 SETTINGS = (
     "loss=charnerf",

@@ -7,14 +7,13 @@ from dataclasses import replace
 import pytest
 import torch
 
-import helpers
-import tiny_models
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.types import DensityAnswer, FieldOutput, Hull, RayBundle, Scene
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.refinement import march, split_bins
+from support import helpers, tiny_models
 
 BOX = (torch.tensor((-1.8, -1.8, -0.8)), torch.tensor((1.8, 1.8, 2.8)))
 COMMON = {"quadrature": PiecewiseConstant(), "num_fine": 0, "memory_mib": 64}

@@ -6,8 +6,6 @@ from dataclasses import replace
 import pytest
 import torch
 
-import helpers
-import tiny_models
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import hull_contains
 from charnerf.types import FieldOutput, Hull, RayBundle, Scene
@@ -15,6 +13,7 @@ from charnerf.volume.quadrature import PiecewiseConstant, PiecewiseLinear
 from charnerf.volume.renderers.base import AbstractRenderer, chunk_size
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
+from support import helpers, tiny_models
 
 BOX = (torch.tensor((-1.8, -1.8, -0.8)), torch.tensor((1.8, 1.8, 2.8)))
 RED = (0.8, 0.3, 0.1)

@@ -9,7 +9,6 @@ from typing import Any
 
 import torch
 
-from charnerf import runs
 from charnerf.bench.headline import ADAPTIVE, CULLED
 from charnerf.bench.measure import in_turns
 from charnerf.bench.rendering import BASELINE, measure
@@ -17,6 +16,7 @@ from charnerf.bench.subjects import Pictured, reference, subject, untrained_like
 from charnerf.bench.training_step import batch_of, parameters_of, step_timings
 from charnerf.bench.workbench import settings_of
 from charnerf.config.composition import compose_config
+from charnerf.inference import weights as runs
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.base import AbstractRenderer

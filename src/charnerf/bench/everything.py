@@ -10,7 +10,6 @@ from typing import Any
 
 import torch
 
-from charnerf import runs
 from charnerf.bench.architectures import architecture_rows, large_network, network_of, step_at_scale
 from charnerf.bench.headline import ADAPTIVE, CULLED, DENSE, NUM_PIXELS, Workbench, quick
 from charnerf.bench.hull_cut import cut_by_hull
@@ -32,6 +31,7 @@ from charnerf.bench.sweeps import (
 from charnerf.bench.training_step import compared_curves, loss_curves
 from charnerf.bench.workbench import settings_of
 from charnerf.geometry.resizing import resized_views
+from charnerf.inference import weights as runs
 from charnerf.types import Cameras, SourceViews
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer

@@ -19,7 +19,7 @@ from charnerf.bench.tables import comparison_table, headline_table, markdown
 from charnerf.bench.workbench import workbench
 from charnerf.errors import ConfigError
 from charnerf.evaluation.environment import environment
-from charnerf.model_api import Model
+from charnerf.inference.model import Model
 
 NUMBERS, PAGE = "bench.json", "bench.md"
 

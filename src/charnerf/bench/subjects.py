@@ -14,12 +14,12 @@ from torch import Tensor
 from charnerf.bench.baseline import PixelAligned
 from charnerf.bench.kinds import KINDS
 from charnerf.capture.embree import CaptureOptions, capture_character
-from charnerf.capture.procedural.character import make_character
-from charnerf.capture.procedural.dataset import character_seed
+from charnerf.capture.procedural_data import character_seed
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.models.charnerf import CharNeRF
+from charnerf.procedural.character import make_character
 from charnerf.types import Cameras, Hull, RayBundle, Scene, SourceViews
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.dense import DenseRenderer

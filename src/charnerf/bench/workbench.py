@@ -3,11 +3,11 @@
 import copy
 from typing import Any
 
-from charnerf import runs
 from charnerf.bench.headline import ADAPTIVE, CULLED, DENSE, Workbench
 from charnerf.bench.subjects import untrained_like
 from charnerf.config.composition import compose_config
-from charnerf.model_api import Model
+from charnerf.inference import weights as runs
+from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.base import AbstractRenderer

@@ -11,7 +11,7 @@ import numpy as np
 
 from charnerf.capture.meshes import HEIGHT
 from charnerf.capture.outline import CELL_WIDTH, ROW_HEIGHT, middle_runs
-from charnerf.data.surface_mesh import SurfaceMesh
+from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 LOWERED = (np.radians(10.0), np.radians(80.0))  # how far arms are turned down
 _BENT = np.radians(15.0)  # standard deviation of the elbows' turns up and down

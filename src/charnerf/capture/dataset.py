@@ -19,10 +19,10 @@ from charnerf.capture.part_swaps import swap_parts
 from charnerf.capture.variants import SEPARATOR, variant
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
-from charnerf.data.mesh_files import write_surface_mesh
-from charnerf.data.scene_mesh import surface_of_scene
-from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import CharNeRFError, DataError
+from charnerf.surfaces.mesh_files import write_surface_mesh
+from charnerf.surfaces.scene_mesh import surface_of_scene
+from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 
 @dataclass(frozen=True)

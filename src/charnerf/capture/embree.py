@@ -12,10 +12,6 @@ from scipy import ndimage
 
 from charnerf.capture.lights import AbstractLight, Unlit
 from charnerf.data.characters import SOURCE_ORDER, CharacterPictures
-from charnerf.data.color import srgb_from_linear
-from charnerf.data.raycast import Hits, RayCaster
-from charnerf.data.scene_mesh import surface_of_scene
-from charnerf.data.surface_mesh import SurfaceMesh, shade, texture_levels, triangle_normals
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import (
     cameras_towards,
@@ -24,6 +20,10 @@ from charnerf.geometry.cameras import (
     pixel_rays,
     project,
 )
+from charnerf.surfaces.color import srgb_from_linear
+from charnerf.surfaces.raycast import Hits, RayCaster
+from charnerf.surfaces.scene_mesh import surface_of_scene
+from charnerf.surfaces.surface_mesh import SurfaceMesh, shade, texture_levels, triangle_normals
 from charnerf.types import Cameras
 
 CENTRE = (0.0, 0.0, 1.0)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from charnerf.data.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
 from charnerf.errors import ConfigError, DataError
+from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
 
 HEIGHT = 2.0
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")

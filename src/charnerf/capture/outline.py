@@ -3,8 +3,8 @@
 import numpy as np
 
 from charnerf.capture.meshes import HEIGHT
-from charnerf.data.surface_mesh import SurfaceMesh, interpolate, triangle_areas
 from charnerf.errors import DataError
+from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, triangle_areas
 
 ROWS, COLUMNS = 80, 80
 REACH = 1.6  # m: half the width looked at

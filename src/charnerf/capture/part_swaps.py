@@ -13,8 +13,8 @@ import numpy as np
 from charnerf.capture.arms import find_arms
 from charnerf.capture.outline import CELL_WIDTH, COLUMNS, ROW_HEIGHT, ROWS, middle_runs
 from charnerf.capture.variants import REACH, bent, posed, stand
-from charnerf.data.surface_mesh import SurfaceMesh
 from charnerf.errors import DataError
+from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 # Shares of the height: where the widest row is taken for the shoulders if no arms are held out; how far above them a neck is looked
 # for; where a gap between the legs is.

@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from charnerf.capture.arms import lower_arms
 from charnerf.capture.meshes import HEIGHT
-from charnerf.data.surface_mesh import SurfaceMesh
+from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 SEPARATOR = "+"  # NAME+2 is the second variant of NAME
 REACH = 1.5  # m: width and depth that no variant goes beyond to a side, unless its character did

@@ -8,11 +8,11 @@ from typing import final
 import numpy as np
 import torch
 
-from charnerf.data.color import srgb_from_linear
-from charnerf.data.mesh_files import load_surface_mesh
-from charnerf.data.surface_mesh import SurfaceMesh, interpolate, shade, triangle_areas
 from charnerf.data.visibility import Seen, capture_cameras, default_cameras, see_points
 from charnerf.errors import DataError
+from charnerf.surfaces.color import srgb_from_linear
+from charnerf.surfaces.mesh_files import load_surface_mesh
+from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, shade, triangle_areas
 from charnerf.types import Cameras, SurfacePoints
 
 __all__ = ["AbstractSurface", "AreaSurface", "VisibleSurface", "load_surface_mesh", "visible_surface_points"]

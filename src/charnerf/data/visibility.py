@@ -7,10 +7,10 @@ import numpy as np
 import torch
 
 from charnerf.data.layout import TRANSFORMS_FILE
-from charnerf.data.raycast import RayCaster
-from charnerf.data.surface_mesh import SurfaceMesh, triangle_normals
 from charnerf.data.transforms import read_transforms
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles, fibonacci_hemisphere
+from charnerf.surfaces.raycast import RayCaster
+from charnerf.surfaces.surface_mesh import SurfaceMesh, triangle_normals
 from charnerf.types import Cameras
 
 _TOLERANCE = 2e-5  # m in front of a point that is still the point: float32 along rays of some metres

@@ -10,7 +10,7 @@ from PIL import Image
 from charnerf.capture.embree import capture_sources
 from charnerf.data.characters import SOURCE_ORDER, Character
 from charnerf.data.drawing_style import draw_pictures, random_style
-from charnerf.data.mesh_files import load_surface_mesh
+from charnerf.surfaces.mesh_files import load_surface_mesh
 
 PAPER = (252, 251, 247)
 MISTAKES = {"wobble": 0.006, "shift": 0.01, "scale": 0.015}  # as conf/augmentation/drawing.yaml

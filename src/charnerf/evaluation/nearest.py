@@ -17,10 +17,10 @@ from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
-from charnerf.data.mesh_files import load_surface_mesh
 from charnerf.evaluation.baselines import used_drawings
 from charnerf.evaluation.projected import ProjectedMesh, look_up
 from charnerf.geometry.cameras import project
+from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.types import Cameras, RenderOutput, SourceViews
 
 NO_TRAINING_SET = "no training characters were named; name them with --nearest-from"

@@ -16,7 +16,6 @@ from torch import Tensor
 
 from charnerf.data.characters import Character
 from charnerf.data.layout import read_json, write_text_atomically
-from charnerf.data.raycast import RayCaster
 from charnerf.data.surface import load_surface_mesh
 from charnerf.errors import DataError
 from charnerf.evaluation.evaluate import fixed_views
@@ -25,6 +24,7 @@ from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import stratified_t_vals
 from charnerf.models.charnerf import CharNeRF
+from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import RayBundle, Scene
 from charnerf.volume.compositing import expected_depth, weights_from_densities
 from charnerf.volume.renderers.base import AbstractRenderer

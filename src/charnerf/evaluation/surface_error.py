@@ -6,12 +6,12 @@ import numpy as np
 import torch
 import trimesh
 
-from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.data.surface import AreaSurface, visible_surface_points
-from charnerf.data.surface_mesh import interpolate
 from charnerf.data.visibility import see_points
 from charnerf.errors import DataError
 from charnerf.evaluation.metrics import chamfer_of_distances, f_score_of_distances, surface_distances
+from charnerf.surfaces.scene_mesh import surface_of_scene
+from charnerf.surfaces.surface_mesh import interpolate
 from charnerf.types import Cameras
 
 NUM_POINTS = 50_000

@@ -11,7 +11,7 @@ from charnerf.errors import DataError
 from charnerf.finetuning.finetune import CurvePoint, Finetuned, finetune
 from charnerf.finetuning.recipe import Recipe
 from charnerf.finetuning.report import summary_lines, write_finetuned
-from charnerf.model_api import Hero, Model
+from charnerf.inference.model import Hero, Model
 
 BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.finetuning.finetune import LEARNING, CurvePoint, Finetuned
 from charnerf.finetuning.recipe import Recipe
-from charnerf.runs import save_config, save_weights
+from charnerf.inference.weights import save_config, save_weights
 
 ROWS = 12  # of the curve shown in the report; curve.csv has all
 OURS, LIKENESS = "#1f5fa8", "#b8641f"

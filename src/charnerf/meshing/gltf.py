@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from charnerf.data.color import linear_from_srgb
 from charnerf.meshing.parts import MeshParts
+from charnerf.surfaces.color import linear_from_srgb
 
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
 _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963

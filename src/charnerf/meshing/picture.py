@@ -8,11 +8,11 @@ import numpy as np
 import torch
 import trimesh
 
-from charnerf.data.color import srgb_from_linear
-from charnerf.data.raycast import Hits, RayCaster
-from charnerf.data.scene_mesh import COLORS_KEY, surface_of_scene
-from charnerf.data.surface_mesh import SurfaceMesh, interpolate, shade
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
+from charnerf.surfaces.color import srgb_from_linear
+from charnerf.surfaces.raycast import Hits, RayCaster
+from charnerf.surfaces.scene_mesh import COLORS_KEY, surface_of_scene
+from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, shade
 from charnerf.types import Cameras
 
 OVERSAMPLING = 3  # rays a pixel, along each side

@@ -21,9 +21,9 @@ import trimesh
 from scipy import ndimage
 from torch import Tensor
 
-from charnerf.data.raycast import RayCaster
-from charnerf.data.scene_mesh import surface_of_scene
 from charnerf.geometry.cameras import directions_to_points, pixel_centres, pixel_rays, project
+from charnerf.surfaces.raycast import RayCaster
+from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.types import Cameras, SourceViews
 
 OPAQUE = 0.9  # alpha from which a pixel is the figure's alone

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from charnerf.data.color import linear_from_srgb
 from charnerf.errors import DataError, DependencyError
 from charnerf.meshing.parts import MeshParts
+from charnerf.surfaces.color import linear_from_srgb
 
 
 def encode_usdz(parts: MeshParts) -> bytes:

@@ -15,10 +15,10 @@ from tqdm import tqdm
 from charnerf.errors import DataError
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.report import plot_curve, summary_lines
+from charnerf.inference.model import HEIGHT, TEXTURE_SIZE, Model, TextureKind
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
-from charnerf.model_api import HEIGHT, TEXTURE_SIZE, Model, TextureKind
 from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import mesh_sentences, mesh_words, report_text
 from charnerf.reconstruction.turntable import on_white, render_around, write_film

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from charnerf.errors import DataError
-from charnerf.model_api import Hero, Model
+from charnerf.inference.model import Hero, Model
 from charnerf.reconstruction.turntable import ELEVATION_DEG, on_white
 
 AZIMUTHS_DEG = (30, 60, 135, 225, 315)  # between and behind the drawings

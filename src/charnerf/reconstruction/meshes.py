@@ -6,11 +6,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from charnerf.inference.model import HEIGHT, TEXTURE_SIZE, Hero, TextureKind
 from charnerf.meshing.convergence import convergence_lines, measure_convergence
 from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh, write_aside
 from charnerf.meshing.lod import Lod, lod_report, named
 from charnerf.meshing.sheet import contact_sheet
-from charnerf.model_api import HEIGHT, TEXTURE_SIZE, Hero, TextureKind
 from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import level_lines, mesh_sentences, mesh_words
 

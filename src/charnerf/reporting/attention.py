@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from charnerf import runs
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import CharNeRFError
@@ -15,6 +14,7 @@ from charnerf.evaluation.attention import (
     view_attention_of,
     write_profile,
 )
+from charnerf.inference import weights as runs
 from charnerf.reporting.blocks import Block, Heading, Picture, Plot, Text
 from charnerf.reporting.interactive import Line, lines_figure
 from charnerf.reporting.plots import plot_lines

@@ -13,13 +13,13 @@ import numpy as np
 import torch
 from PIL import Image
 
-from charnerf import runs
 from charnerf.drawings.align import figure_box, half_extent, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array, load_drawing
 from charnerf.drawings.turnaround import SIDES, source_cameras
 from charnerf.errors import CharNeRFError, DataError
-from charnerf.model_api import Model
+from charnerf.inference import weights as runs
+from charnerf.inference.model import Model
 from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.pictures import CELL, from_floats, save_matrix
 from charnerf.reporting.rows import Row

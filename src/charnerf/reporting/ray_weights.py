@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from charnerf import runs
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import CharNeRFError
@@ -16,6 +15,7 @@ from charnerf.evaluation.ray_weights import (
     read_ray_weights,
     write_ray_weights,
 )
+from charnerf.inference import weights as runs
 from charnerf.reporting.blocks import Block, Bullets, Heading, Picture, Plot, Table, Text
 from charnerf.reporting.interactive import Line, lines_figure
 from charnerf.reporting.parts import NONE

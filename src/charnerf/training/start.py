@@ -4,9 +4,9 @@ from omegaconf import DictConfig, OmegaConf
 
 from charnerf.config import MODEL_SECTIONS
 from charnerf.errors import ConfigError, ShapeError
+from charnerf.inference.weights import load
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.growth import grow_from
-from charnerf.runs import load
 
 NETWORK_SECTIONS = [name for name in MODEL_SECTIONS if name not in ("quadrature", "renderer")]
 MAY_GROW = ("model.width", "model.num_single_view_blocks", "model.num_multi_view_blocks")

@@ -1,0 +1,233 @@
+"""Data sets of embedded characters: generated once, kept in a cache folder, resumed if interrupted."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from tqdm import tqdm
+
+from charnerf.capture.dataset import capture_scene_to, made_by
+from charnerf.capture.embree import CaptureOptions
+from charnerf.capture.parallel import in_processes
+from charnerf.data.characters import remove_partial_characters
+from charnerf.data.layout import (
+    DATASET_FILE,
+    DatasetInfo,
+    add_to_split,
+    open_or_new,
+    read_dataset,
+    write_dataset,
+)
+from charnerf.errors import ConfigError, DataError
+from charnerf.procedural.character import make_character
+
+GENERATOR_VERSION = 2  # raise it whenever the characters of a seed change: caches are named after it
+SPLITS = ("train", "val", "test")
+
+
+def character_seed(seed: int, split: str, index: int) -> int:
+    """The seed of one character: 128 bits from the data set's seed, the split and the index.
+
+    Args:
+        seed: Seed of the data set, not negative.
+        split: "train", "val" or "test".
+        index: Number within the split.
+    """
+    words = np.random.SeedSequence(seed, spawn_key=(SPLITS.index(split), index)).generate_state(4, np.uint32)
+    return int.from_bytes(words.astype("<u4").tobytes(), "little")
+
+
+def generate_dataset(
+    root: str | Path,
+    train: int,
+    val: int,
+    test: int,
+    seed: int,
+    *,
+    views: int = 48,
+    size: int = 128,
+    depth: bool = False,
+    processes: int | None = None,
+) -> DatasetInfo:
+    """Write embedded characters as a data set; those that are there already are kept.
+
+    Args:
+        root: Folder, new or holding a data set that was made with the same seed and settings.
+        train: Characters in the training split.
+        val: In the validation split.
+        test: In the test split.
+        seed: Seed of the whole set; splits never share a character.
+        views: Target pictures a character.
+        size: Side of every picture, pixels.
+        depth: Whether depth pictures are written too.
+        processes: Worker processes; None for one a core.
+
+    Returns:
+        The data set.
+
+    Raises:
+        ConfigError: If a number is out of range.
+        DataError: If the folder holds something else.
+    """
+    counts = {"train": train, "val": val, "test": test}
+    _check_numbers({**counts, "seed": seed}, views=views, size=size)
+    root, options = Path(root), CaptureOptions(views=views, size=size, depth=depth)
+    facts = {
+        **made_by(options),
+        "generator": "procedural",
+        "generator_version": GENERATOR_VERSION,
+        "seed": seed,
+    }
+    root.mkdir(parents=True, exist_ok=True)
+    with _locked(root):
+        wanted = _wanted(counts)
+        _begin(root, wanted, facts)
+        missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
+        work = partial(_make, root=root, seed=seed, options=options)
+        with tqdm(
+            total=len(wanted),
+            initial=len(wanted) - len(missing),
+            desc="embedded characters",
+            unit="character",
+            dynamic_ncols=True,
+            disable=not missing,
+        ) as bar:
+            for (split, index), _ in in_processes(work, missing, processes):
+                add_to_split(root, split, [_name(split, index)])
+                bar.update()
+    return read_dataset(root)
+
+
+@final
+class ProceduralData:
+    """Embedded characters in a cache folder, generated on first use.
+
+    Args:
+        train: Characters in the training split.
+        val: In the validation split.
+        test: In the test split.
+        seed: Seed of the whole set.
+        size: Side of every picture, pixels.
+        views: Target pictures a character.
+        cache: Folder for such data sets; None for charnerf's folder in the user's cache.
+    """
+
+    def __init__(
+        self, *, train: int, val: int, test: int, seed: int, size: int, views: int, cache: str | None = None
+    ) -> None:
+        _check_numbers({"train": train, "val": val, "test": test, "seed": seed}, views=views, size=size)
+        self._settings = {
+            "train": train,
+            "val": val,
+            "test": test,
+            "seed": seed,
+            "size": size,
+            "views": views,
+        }
+        self._cache = Path(cache).expanduser() if cache is not None else default_cache()
+
+    @property
+    def root(self) -> Path:
+        """Where the data set is, or will be: its name tells every setting and the generator's version."""
+        return self._root(self._settings)
+
+    def _root(self, settings: dict[str, int]) -> Path:
+        text = json.dumps({**settings, "generator_version": GENERATOR_VERSION}, sort_keys=True)
+        return (
+            self._cache / f"procedural-v{GENERATOR_VERSION}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+        )
+
+    def prepare(self, *, depth: bool = False) -> Path:
+        """Generate what is missing; the data set's folder.
+
+        Args:
+            depth: Whether a loss reads captured depth: the same characters and pictures with depth, in a folder of their own.
+
+        Raises:
+            DataError: If the folder can not be made or holds something else.
+        """
+        root = self._root({**self._settings, "depth": True} if depth else self._settings)
+        if not self._is_complete(root):
+            generate_dataset(root, **self._settings, depth=depth)
+        return root
+
+    def _is_complete(self, root: Path) -> bool:
+        if not (root / DATASET_FILE).is_file():
+            return False
+        splits = read_dataset(root).splits
+        return all(
+            len(splits.get(split, ())) == self._settings[split]
+            and all((root / name).is_dir() for name in splits.get(split, ()))
+            for split in SPLITS
+        )
+
+
+def default_cache() -> Path:
+    """Charnerf's folder in the user's cache: $XDG_CACHE_HOME or ~/.cache."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "charnerf"
+
+
+def _check_numbers(counts: dict[str, int], *, views: int, size: int) -> None:
+    for name, value in counts.items():
+        if value < 0:
+            raise ConfigError(f"{name}: found {value}, expected 0 or more.")
+    if sum(counts[split] for split in SPLITS) == 0:
+        raise ConfigError("train, val, test: found 0 each, expected at least one character in all.")
+    if views < 1 or size < 8:
+        raise ConfigError(f"views, size: found {views} and {size}, expected views >= 1 and size >= 8 pixels.")
+
+
+def _name(split: str, index: int) -> str:
+    return f"{split}-{index:05d}"
+
+
+def _wanted(counts: dict[str, int]) -> list[tuple[str, int]]:
+    return [(split, index) for split, count in counts.items() for index in range(count)]
+
+
+def _begin(root: Path, wanted: Sequence[tuple[str, int]], facts: dict[str, Any]) -> None:
+    """Make or check dataset.json, and list characters that an interrupted run wrote but did not list."""
+    info = open_or_new(root)
+    differing = [
+        key for key, value in facts.items() if key != "program" and info.made_by.get(key, value) != value
+    ]
+    if differing or (info.splits and info.made_by.get("generator") != "procedural"):
+        keys = ", ".join(differing) or "generator"
+        raise DataError(
+            f"{root}: holds a data set made otherwise ({keys}); name another folder or remove this one."
+        )
+    remove_partial_characters(root)
+    splits: dict[str, tuple[str, ...]] = {}
+    for split in SPLITS:
+        mine = {_name(*pair) for pair in wanted if pair[0] == split and (root / _name(*pair)).is_dir()}
+        kept = {name for name in info.splits.get(split, ()) if (root / name).is_dir()}
+        splits[split] = tuple(sorted(kept | mine))
+    write_dataset(DatasetInfo(root=root, splits=splits, made_by={**info.made_by, **facts}))
+
+
+def _make(pair: tuple[str, int], *, root: Path, seed: int, options: CaptureOptions) -> None:
+    """Generate and capture one character."""
+    capture_scene_to(root, _name(*pair), make_character(character_seed(seed, *pair)), options)
+
+
+@contextmanager
+def _locked(root: Path) -> Iterator[None]:
+    """One process generates, others wait; the system frees the lock of a killed one."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: two commands at once on one folder are not guarded
+        yield
+        return
+    handle = os.open(root / ".generate.lock", os.O_RDWR | os.O_CREAT)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,1 @@
+"""The library: parts from a config, weights files, a loaded model, an encoded character."""

@@ -1,0 +1,287 @@
+"""Characters made of coarse cubes, as voxel editors draw them."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from charnerf.procedural.palette import BLACK, WHITE, Palette, make_palette
+from charnerf.procedural.parts import Part, flat
+from charnerf.procedural.shapes import box
+from charnerf.procedural.textures import Colour, darker, mix
+
+Block = NDArray[np.int64]  # (x, y, z) of colour numbers; 0 is empty
+
+
+class Voxels:
+    """Named blocks of coloured cubes on one grid; y grows to the back, x to the character's left.
+
+    Args:
+        rng: Random numbers of the character.
+        palette: Its colours.
+    """
+
+    def __init__(self, rng: np.random.Generator, palette: Palette) -> None:
+        self.rng = rng
+        self.palette = palette
+        self._colours: list[Colour] = []
+        self._blocks: dict[str, tuple[Block, tuple[int, int, int]]] = {}
+
+    def colour(self, value: ArrayLike) -> int:
+        """Number of a colour."""
+        self._colours.append(np.asarray(value, dtype=np.float64))
+        return len(self._colours)
+
+    def add(self, name: str, corner: tuple[int, int, int], size: tuple[int, int, int], colour: int) -> Block:
+        """A block full of one colour; paint or carve it in place."""
+        block = np.full(size, colour, dtype=np.int64)
+        key = name
+        while key in self._blocks:
+            key += "'"
+        self._blocks[key] = (block, corner)
+        return block
+
+    def parts(self) -> list[Part]:
+        """Boxes of equal colour, as few as merging along x, then z, then y gives.
+
+        A cube that several blocks fill is the last one's: two that share a face would flicker between their colours.
+        """
+        parts = []
+        for key, (block, corner) in self._owned().items():
+            for low, high, number in _boxes(block):
+                start, end = np.array(corner) + low, np.array(corner) + high
+                shape = box(0.5 * (start + end), 0.5 * (end - start))
+                parts.append(flat(key.rstrip("'"), shape, self._colours[number - 1]))
+        return parts
+
+    def _owned(self) -> dict[str, tuple[Block, tuple[int, int, int]]]:
+        """The blocks without the cubes that later ones fill."""
+        low = np.min([corner for _, corner in self._blocks.values()], axis=0)
+        high = np.max([np.add(corner, block.shape) for block, corner in self._blocks.values()], axis=0)
+        taken = np.zeros(high - low, dtype=bool)
+        owned = {}
+        for key, (block, corner) in reversed(self._blocks.items()):
+            place = tuple(
+                slice(start, start + size) for start, size in zip(corner - low, block.shape, strict=True)
+            )
+            owned[key] = (np.where(taken[place], 0, block), corner)
+            taken[place] |= block > 0
+        return {key: owned[key] for key in self._blocks}
+
+
+def _boxes(block: Block) -> list[tuple[NDArray[np.int64], NDArray[np.int64], int]]:
+    """Cover the cubes of a block by boxes of one colour each: low and high corners, colour number."""
+    left = block.copy()
+    found = []
+    for x, y, z in np.argwhere(block > 0):
+        number = left[x, y, z]
+        if number == 0:
+            continue
+        end_x = x
+        while end_x < left.shape[0] and left[end_x, y, z] == number:
+            end_x += 1
+        end_z = z
+        while end_z < left.shape[2] and (left[x:end_x, y, end_z] == number).all():
+            end_z += 1
+        end_y = y
+        while end_y < left.shape[1] and (left[x:end_x, end_y, z:end_z] == number).all():
+            end_y += 1
+        left[x:end_x, y:end_y, z:end_z] = 0
+        found.append((np.array((x, y, z)), np.array((end_x, end_y, end_z)), int(number)))
+    return found
+
+
+def _paint_torso(voxels: Voxels, torso: Block, cloth: int) -> None:
+    rng, palette = voxels.rng, voxels.palette
+    second, accent, leather = (
+        voxels.colour(value) for value in (palette.second, palette.accent, palette.leather)
+    )
+    width, _, height = torso.shape
+    kind = int(rng.integers(7))
+    if kind == 0:
+        torso[:, :, ::2] = second
+    elif kind == 1:
+        torso[width // 2 - 1 : width - width // 2 + 1, 0, :] = second
+    elif kind == 2:
+        torso[1, 0, :] = torso[-2, 0, :] = accent
+    elif kind == 3:
+        torso[width // 2 :, :, :] = second
+    elif kind == 4:
+        torso[width // 2 - 1 : width // 2 + 1, 0, height // 2 : height // 2 + 2] = accent
+    elif kind == 5:
+        for step in range(height):
+            torso[min(step * width // height, width - 1), :, step] = accent
+    if rng.uniform() < 0.5:
+        torso[:, :, 0] = leather
+        torso[width // 2, 0, 0] = accent
+    if rng.uniform() < 0.35:
+        torso[width // 2 - 1 : width // 2 + 1, -1, 1 : height - 1] = second
+    if rng.uniform() < 0.3:
+        torso[width // 2 - 1 : width - width // 2 + 1, 0, -1] = voxels.colour(palette.skin)
+    torso[torso == 0] = cloth
+
+
+def _paint_face(voxels: Voxels, head: Block) -> None:
+    rng, palette = voxels.rng, voxels.palette
+    width, _, height = head.shape
+    eye = voxels.colour(BLACK if rng.uniform() < 0.6 else palette.eyes)
+    white, dark = voxels.colour(WHITE), voxels.colour(darker(mix(palette.skin, (0.5, 0.1, 0.1), 0.5), 0.8))
+    level = int(rng.integers(max(1, height // 3), max(2, height // 2 + 1)))
+    inset = 1 if width < 7 or rng.uniform() < 0.5 else 2
+    tall = 2 if height >= 6 and rng.uniform() < 0.4 else 1
+    for column in (inset, width - 1 - inset):
+        head[column, 0, level : level + tall] = eye
+    if rng.uniform() < 0.3 and inset >= 1:
+        head[inset - 1 if inset > 1 else inset + 1, 0, level] = white
+        head[width - inset if inset > 1 else width - 2 - inset, 0, level] = white
+    if rng.uniform() < 0.6 and level >= 2:
+        span = int(rng.integers(0, 2))
+        head[width // 2 - 1 - span : width - width // 2 + 1 + span, 0, level - 2] = dark
+    if rng.uniform() < 0.2:
+        head[:, 0, : max(1, level - 1)] = voxels.colour(palette.hair)
+    if rng.uniform() < 0.1:
+        head[:, 0, level] = np.where(head[:, 0, level] == eye, eye, voxels.colour(palette.accent))
+
+
+def _add_hair(voxels: Voxels, corner: tuple[int, int, int], size: tuple[int, int, int]) -> None:
+    """Hair, a hat, a helmet or ears over a head."""
+    rng, palette = voxels.rng, voxels.palette
+    (x, y, z), (width, depth, height) = corner, size
+    hair, main = (
+        voxels.colour(palette.hair),
+        voxels.colour(palette.main if rng.uniform() < 0.5 else palette.accent),
+    )
+    kind = int(rng.integers(8))
+    if kind in (0, 1, 2):
+        drop = int(rng.integers(1, height + (2 if kind == 2 else 0)))
+        voxels.add(
+            "hair",
+            (x - (kind == 2), y - (kind != 0), z + height - 1),
+            (width + 2 * (kind == 2), depth + 1 + (kind != 0), 2),
+            hair,
+        )
+        voxels.add("hair", (x, y + depth, z + height - 1 - drop), (width, 1, drop), hair)
+        if kind == 1 or rng.uniform() < 0.4:
+            side = int(rng.integers(1, height))
+            for column in (x - 1, x + width):
+                voxels.add("hair", (column, y + 1, z + height - side), (1, depth, side), hair)
+    elif kind == 3:
+        voxels.add("hair", (x + width // 2 - 1, y, z + height), (2, depth + 1, int(rng.integers(1, 4))), hair)
+        voxels.add(
+            "hair", (x + width // 2 - 1, y + depth, z + height // 2), (2, 1, height - height // 2), hair
+        )
+    elif kind == 4:
+        brim = int(rng.integers(1, 3))
+        voxels.add("hat", (x - brim, y - brim, z + height), (width + 2 * brim, depth + 2 * brim, 1), main)
+        tall = int(rng.integers(1, 5))
+        crown = voxels.add("hat", (x + 1, y + 1, z + height + 1), (width - 2, max(depth - 2, 1), tall), main)
+        crown[:, :, 0] = voxels.colour(palette.second)
+    elif kind == 5:
+        voxels.add("hat", (x, y, z + height), (width, depth, 1), main)
+        voxels.add("hat", (x, y - 2, z + height - 1), (width, 2, 1), voxels.colour(darker(palette.main, 0.7)))
+        voxels.add("hair", (x, y + depth, z + 1), (width, 1, height - 1), hair)
+    elif kind == 6:
+        helmet = voxels.add(
+            "helmet",
+            (x - 1, y - 1, z + height // 2),
+            (width + 2, depth + 2, height - height // 2 + 1),
+            voxels.colour(palette.metal),
+        )
+        helmet[2:-2, 0, :-2] = 0
+        if rng.uniform() < 0.6:
+            for column in (x - 2, x + width + 1):
+                voxels.add(
+                    "helmet", (column, y + 1, z + height - 1), (1, 1, 3), voxels.colour((0.9, 0.87, 0.78))
+                )
+    else:
+        tall = int(rng.integers(1, 5))
+        for column in (x, x + width - 1 - (tall < 3)):
+            voxels.add(
+                "ears",
+                (column, y + depth // 2, z + height),
+                (1 + (tall < 3), 1, tall),
+                voxels.colour(palette.skin),
+            )
+
+
+def _add_extras(voxels: Voxels, width: int, depth: int, low: int, high: int) -> None:
+    """Packs, capes, tails and things in a hand."""
+    rng, palette = voxels.rng, voxels.palette
+    kind = int(rng.integers(9))
+    x = -(width // 2)
+    if kind == 0:
+        voxels.add(
+            "backpack",
+            (x + 1, depth, low + 1),
+            (width - 2, 2, max(high - low - 1, 1)),
+            voxels.colour(palette.leather),
+        )
+    elif kind == 1:
+        cape = voxels.add("cape", (x, depth, 1), (width, 1, high - 1), voxels.colour(palette.accent))
+        cape[:, :, 0] = voxels.colour(palette.second)
+    elif kind == 2:
+        voxels.add("tail", (x + width // 2, depth, low), (1, 2, 1), voxels.colour(palette.skin))
+        voxels.add("tail", (x + width // 2, depth + 2, low), (1, 1, 3), voxels.colour(palette.skin))
+    elif kind == 3:
+        for side in (x - 2, x + width):
+            voxels.add("pauldrons", (side, 0, high - 1), (2, depth, 1), voxels.colour(palette.metal))
+
+
+def make_voxel_parts(rng: np.random.Generator) -> list[Part]:
+    """A character of cubes, one unit a cube."""
+    surface = ("human", "human", "human", "creature", "robot", "fur")[int(rng.integers(6))]
+    palette = make_palette(rng, surface)
+    voxels = Voxels(rng, palette)
+    fine = int(rng.integers(1, 3))
+    leg_width, leg_height = int(rng.integers(1, 3)) + fine - 1, int(rng.integers(2, 6)) * fine
+    width, depth = 2 * int(rng.integers(2, 4)) * fine, int(rng.integers(2, 5)) * fine
+    torso_height = int(rng.integers(3, 6)) * fine
+    leg_width = min(max(leg_width, width // 4), width // 2)
+    skin, cloth, trousers, boots = (
+        voxels.colour(value) for value in (palette.skin, palette.main, palette.trousers, palette.boots)
+    )
+    half = width // 2
+    inset = int(rng.integers(0, max(1, half - leg_width + 1)))
+    leg_depth = max(1, depth - int(rng.integers(0, 2)))
+    for name, start in (("left_leg", half - inset - leg_width), ("right_leg", -half + inset)):
+        leg = voxels.add(
+            name, (start, (depth - leg_depth) // 2, 0), (leg_width, leg_depth, leg_height), trousers
+        )
+        leg[:, :, : max(1, leg_height // 4)] = boots
+        toe = int(rng.integers(0, 2))
+        if toe:
+            voxels.add(name, (start, (depth - leg_depth) // 2 - 1, 0), (leg_width, 1, 1), boots)
+    torso = voxels.add("trunk", (-half, 0, leg_height), (width, depth, torso_height), cloth)
+    _paint_torso(voxels, torso, cloth)
+    shoulder = leg_height + torso_height
+    arm = min(int(rng.integers(1, 3)) * fine, torso_height)
+    level = rng.uniform() < 0.5
+    reach = int(rng.integers(2, 5)) * fine if level else max(1, torso_height - int(rng.integers(0, 2)))
+    sleeve = int(rng.integers(0, reach + 1))
+    for name, sign in (("left_arm", 1), ("right_arm", -1)):
+        if level:
+            block = voxels.add(
+                name,
+                (half if sign > 0 else -half - reach, (depth - min(arm, depth)) // 2, shoulder - arm),
+                (reach, min(arm, depth), arm),
+                skin,
+            )
+            block[(slice(0, sleeve) if sign > 0 else slice(reach - sleeve, reach)), :, :] = cloth
+        else:
+            block = voxels.add(
+                name,
+                (half if sign > 0 else -half - arm, 0, shoulder - reach),
+                (arm, min(depth, arm + 1), reach),
+                skin,
+            )
+            block[:, :, reach - sleeve :] = cloth
+    head_width = max(4, width + 2 * int(rng.integers(-1, 2)) * fine)
+    head_size = (
+        head_width,
+        max(3, depth + int(rng.integers(0, 3)) * fine),
+        max(int(rng.integers(3, 6)) * fine, int(0.7 * head_width)),
+    )
+    head_corner = (-(head_width // 2), (depth - head_size[1]) // 2, shoulder)
+    head = voxels.add("head", head_corner, head_size, skin)
+    _paint_face(voxels, head)
+    _add_hair(voxels, head_corner, head_size)
+    _add_extras(voxels, width, depth, leg_height, shoulder)
+    return voxels.parts()

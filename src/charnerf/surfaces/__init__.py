@@ -1,0 +1,1 @@
+"""Textured triangles: mesh files, surfaces, rays that hit them, colour."""
