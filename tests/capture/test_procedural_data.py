@@ -5,12 +5,12 @@ import shutil
 import pytest
 import torch
 
+from charnerf.capture import procedural_data as module
 from charnerf.capture.procedural_data import SPLITS, ProceduralData, character_seed, generate_dataset
 from charnerf.data.characters import load_character
 from charnerf.data.folder import FolderData
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
-from charnerf.capture import procedural_data as module
 
 SMALL = {"train": 1, "val": 0, "test": 1, "seed": 3, "views": 2, "size": 16}
 
