@@ -140,8 +140,7 @@ def test_numbers_out_of_range_are_named() -> None:
     assert problem("scale.width=0", "combinator=mean") == "scale.width: found 0, expected at least 1."
     assert problem("budget.seconds=0") == "budget.seconds: found 0, expected more than 0."
     assert (
-        problem("sampling.foreground_share=1.5")
-        == "sampling.foreground_share: found 1.5, expected at most 1."
+        problem("batches.foreground_share=1.5") == "batches.foreground_share: found 1.5, expected at most 1."
     )
     assert problem("data.views=0") == "data.views: found 0, expected at least 1."
 
@@ -250,8 +249,8 @@ def test_phases_that_do_not_ascend_are_named() -> None:
 
 
 def test_near_below_far_wherever_they_stand() -> None:
-    message = problem("++sampling.near=3.0", "++sampling.far=2.0")
-    assert "sampling.near: found 3.0, expected below sampling.far = 2.0." in message
+    message = problem("++batches.near=3.0", "++batches.far=2.0")
+    assert "batches.near: found 3.0, expected below batches.far = 2.0." in message
 
 
 def test_settings_that_would_be_overwritten_are_refused() -> None:

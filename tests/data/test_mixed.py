@@ -222,7 +222,7 @@ def test_too_small_a_memory_is_told_once(figure_dataset, caplog):
         for name in NAMES * 3:
             tight.open(name)
     (said,) = [record.getMessage() for record in caplog.records]
-    needed = float(re.search(r"sampling\.memory_mib=(\d+) would hold all", said)[1])
+    needed = float(re.search(r"batches\.memory_mib=(\d+) would hold all", said)[1])
     assert "holds about 1 of 2 characters" in said
     roomy = store_of(figure_dataset, memory_mib=needed + 1)
     caplog.clear()

@@ -20,7 +20,7 @@ from charnerf.training.run import build_data, build_trainer, surface_delta, trai
 def smoke_config(root: Path, *overrides: str) -> DictConfig:
     """The smallest run on a data set, on the CPU."""
     return compose_config(
-        ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={root}", "sampling.val_views=1", *overrides]
+        ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={root}", "validation.views=1", *overrides]
     )
 
 
@@ -77,7 +77,7 @@ def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> Sma
         losses=losses,
         surface_dirs=build_part(cfg.surface_dirs),
         optimizer=build_part(cfg.optimizer),
-        final_rate=cfg.sampling.final_rate,
+        final_rate=cfg.optimization.final_lr_scale,
         position=clock.position,
         surface_delta=surface_delta(cfg),
         seed=cfg.seed,

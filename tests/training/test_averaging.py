@@ -9,7 +9,7 @@ from charnerf.training.averaging import WeightAverage
 from support import small_runs
 
 DECAY = 0.5
-STEPS = ("loss=opacity", "encoder=single", "scale.steps=6", "sampling.num_validations=3")
+STEPS = ("loss=opacity", "encoder=single", "scale.steps=6", "validation.times=3")
 AVERAGED = (*STEPS, f"averaging.decay={DECAY}")
 
 

@@ -9,7 +9,7 @@ import torch
 
 from support import small_runs
 
-SHORT = ("encoder=single", "sampling.train_splits=[val]", "scale.phase_rays=[16,16]")
+SHORT = ("encoder=single", "splits.train=[val]", "scale.phase_rays=[16,16]")
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def at_most(seconds: int) -> Iterator[None]:
 
 def test_a_budget_of_seconds_ends_the_run_and_measures_its_end(figure_dataset, tmp_path):
     cfg = small_runs.smoke_config(
-        figure_dataset, *SHORT, "scale.steps=null", "scale.seconds=1.5", "sampling.num_validations=3"
+        figure_dataset, *SHORT, "scale.steps=null", "scale.seconds=1.5", "validation.times=3"
     )
     with at_most(60):
         run = small_runs.assemble(cfg, tmp_path).fit()
@@ -47,7 +47,7 @@ def test_a_budget_of_seconds_ends_the_run_and_measures_its_end(figure_dataset, t
 
 def test_going_on_from_a_run_that_is_over_ends_at_once(figure_dataset, tmp_path):
     """Its weights are what the first run left; more budget goes on from there."""
-    small = ("scale.steps=2", "sampling.num_validations=1")
+    small = ("scale.steps=2", "validation.times=1")
     cfg = small_runs.smoke_config(figure_dataset, *SHORT, *small)
     first = small_runs.assemble(cfg, tmp_path / "first").fit()
     checkpoint = tmp_path / "first/checkpoints/last.ckpt"
@@ -55,7 +55,7 @@ def test_going_on_from_a_run_that_is_over_ends_at_once(figure_dataset, tmp_path)
         again = small_runs.assemble(cfg, tmp_path / "again").fit(checkpoint)
     assert again.recorder.losses == [] and again.clock.steps == 2
     assert torch.equal(small_runs.weights(again.module.model), small_runs.weights(first.module.model))
-    more = small_runs.smoke_config(figure_dataset, *SHORT, "scale.steps=4", "sampling.num_validations=1")
+    more = small_runs.smoke_config(figure_dataset, *SHORT, "scale.steps=4", "validation.times=1")
     with at_most(60):
         longer = small_runs.assemble(more, tmp_path / "longer").fit(checkpoint)
     assert [batch[0] for batch in longer.recorder.batches] == [2, 3]
@@ -63,7 +63,7 @@ def test_going_on_from_a_run_that_is_over_ends_at_once(figure_dataset, tmp_path)
 
 def test_seconds_go_on_after_a_resume_between_two_validations(figure_dataset, tmp_path):
     """No epoch starts there; a clock that waits for one never ends the run."""
-    timed = ("scale.steps=null", "scale.seconds=2.0", "sampling.num_validations=1")
+    timed = ("scale.steps=null", "scale.seconds=2.0", "validation.times=1")
     cfg = small_runs.smoke_config(figure_dataset, *SHORT, *timed)
     run = small_runs.assemble(cfg, tmp_path / "cut", cut_at=3)
     try:

@@ -6,7 +6,7 @@ import torch
 from charnerf.evaluation.timing import Stopwatch
 from support import small_runs
 
-STEPS = ("scale.steps=4", "sampling.num_validations=2")
+STEPS = ("scale.steps=4", "validation.times=2")
 
 
 def run_on(accelerator, root, folder, precision="32-true"):

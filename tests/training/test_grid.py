@@ -17,7 +17,7 @@ from charnerf.training.cells import read_cell, run_cell
 from support import small_runs
 
 ROOT = Path(__file__).resolve().parents[2]
-STEPS = ("encoder=single", "scale.steps=24", "sampling.num_validations=12")
+STEPS = ("encoder=single", "scale.steps=24", "validation.times=12")
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[1])}
 
 TRAINED = """
@@ -80,7 +80,7 @@ def test_a_cell_killed_in_the_middle_ends_as_the_one_that_was_not(figure_dataset
 def test_checkpoints_between_validations_resume_the_same_run(figure_dataset, tmp_path, monkeypatch):
     """One validation at the end of the run: what is kept comes from the clock."""
     monkeypatch.setattr(run, "CHECKPOINT_EVERY", timedelta(microseconds=1))
-    settings = ("encoder=single", "scale.steps=8", "sampling.num_validations=1")
+    settings = ("encoder=single", "scale.steps=8", "validation.times=1")
     cfg = small_runs.smoke_config(figure_dataset, *settings)
     cut = small_runs.assemble(cfg, tmp_path / "cut", cut_at=5)
     with pytest.raises(ConnectionAbortedError):
@@ -109,9 +109,9 @@ def test_a_grid_with_a_failing_cell(figure_dataset, tmp_path, package):
     if package != "basic" and importlib.util.find_spec(f"hydra_plugins.{package}") is None:
         pytest.skip(f"{package} is not installed")
     command = [
-        *(sys.executable, str(ROOT / "train.py"), "-m", "sampling.train_splits=[nope],[val]", "seed=3"),
+        *(sys.executable, str(ROOT / "train.py"), "-m", "splits.train=[nope],[val]", "seed=3"),
         *("data=folder", f"data.root={figure_dataset}", "trainer=cpu", "encoder=single", "scale=smoke"),
-        *("scale.steps=2", "scale.eval_views=1", "sampling.val_views=1", *LAUNCHERS[package]),
+        *("scale.steps=2", "scale.eval_views=1", "validation.views=1", *LAUNCHERS[package]),
     ]
     first = subprocess.run(
         command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
@@ -119,12 +119,12 @@ def test_a_grid_with_a_failing_cell(figure_dataset, tmp_path, package):
     assert first.returncode == 1, first.stderr
     assert "1 of 2 cells are not done" in first.stderr and "failed, DataError" in first.stderr
     (grid,) = (tmp_path / "outputs/grid").iterdir()
-    assert grid.name.startswith("sampling.train_splits-") and (grid / "report.md").is_file()
+    assert grid.name.startswith("splits.train-") and (grid / "report.md").is_file()
     states = {path.parent.name.rpartition("-")[0]: path for path in grid.glob("*/cell.json")}
-    assert sorted(states) == ["sampling.train_splits-[nope]", "sampling.train_splits-[val]"]
-    error = states["sampling.train_splits-[nope]"].parent / "error.txt"
+    assert sorted(states) == ["splits.train-[nope]", "splits.train-[val]"]
+    error = states["splits.train-[nope]"].parent / "error.txt"
     assert "Traceback" in error.read_text()
-    metrics = states["sampling.train_splits-[val]"].parent / "metrics.json"
+    metrics = states["splits.train-[val]"].parent / "metrics.json"
     before = metrics.stat().st_mtime_ns
 
     again = subprocess.run(

@@ -22,8 +22,8 @@ class Poison(L.Callback):
 
 def test_a_loss_that_is_no_number_stops_with_its_batch_saved(figure_dataset, tmp_path):
     cfg = small_runs.smoke_config(
-        figure_dataset, "encoder=single", "sampling.train_splits=[val]", "sampling.val_split=val",
-        "sampling.num_validations=1", "scale.steps=5",
+        figure_dataset, "encoder=single", "splits.train=[val]", "splits.val=val",
+        "validation.times=1", "scale.steps=5",
     )  # fmt: skip
     run = small_runs.assemble(cfg, tmp_path)
     run.trainer.callbacks.append(Poison())
@@ -51,4 +51,4 @@ def test_the_white_alarm_fires_once_after_its_patience(figure_dataset, tmp_path,
         assert steps(3, float("nan")) == 0  # batches that do not show it say nothing
         assert steps(1, 0.001) == 1
         assert steps(5 * PATIENCE, 0.0) == 1
-    assert "sampling.foreground_share" in caplog.text
+    assert "batches.foreground_share" in caplog.text

@@ -7,7 +7,7 @@ from charnerf.errors import ConfigError
 from charnerf.training.run import surface_delta
 from support import small_runs
 
-PAPER = ("experiment=charnerf", "encoder=single", "scale.steps=2", "sampling.num_validations=1")
+PAPER = ("experiment=charnerf", "encoder=single", "scale.steps=2", "validation.times=1")
 
 
 def test_a_combinator_learns_at_its_own_rate_and_points_are_seen_from_cameras(figure_dataset, tmp_path):

@@ -9,7 +9,7 @@ TWO_PHASES = (
     "surface=area",
     "schedule=two_phase",  # until 0.57 of eight steps: the sixth is the first of the second phase
     "scale.steps=8",
-    "sampling.num_validations=4",
+    "validation.times=4",
 )
 
 
@@ -63,11 +63,11 @@ def test_the_last_checkpoint_is_the_last_one_also_where_nothing_got_better(figur
     cfg = small_runs.smoke_config(
         figure_dataset,
         "encoder=single",
-        "sampling.train_splits=[val]",
+        "splits.train=[val]",
         "optimizer=adam",
         "optimizer.lr=1.0e-30",
         "scale.steps=2",
-        "sampling.num_validations=2",
+        "validation.times=2",
     )
     small_runs.assemble(cfg, tmp_path).fit()
     done = {

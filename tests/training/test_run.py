@@ -29,7 +29,7 @@ def run_folder(figure_dataset, tmp_path_factory) -> Path:
         "loss=charnerf",
         weights,
         "schedule=two_phase",
-        "sampling.num_validations=2",
+        "validation.times=2",
         "scale.eval_views=1",
         f"scale.steps={STEPS}",
         "scale.phase_rays=[16,32]",
@@ -88,9 +88,9 @@ def test_tensorboards_own_reader_finds_everything(run_folder):
     assert b"val/psnr_foreground" in events.summary_metadata["_hparams_/experiment"].plugin_data.content
 
 
-@pytest.mark.parametrize("split", ["train_splits=[train,more]", "val_split=more", "test_split=more"])
+@pytest.mark.parametrize("split", ["train=[train,more]", "val=more", "test=more"])
 def test_a_split_that_is_not_there_is_found_before_training(figure_dataset, tmp_path, split):
-    cfg = small_runs.smoke_config(figure_dataset, f"sampling.{split}")
+    cfg = small_runs.smoke_config(figure_dataset, f"splits.{split}")
     with pytest.raises(DataError, match=r"split 'more' does not exist; its splits are: .*test \(1\)"):
         run_training(cfg, tmp_path / "run")
     assert not (tmp_path / "run" / "weights.safetensors").exists()

@@ -14,8 +14,8 @@ from charnerf.models.encoders.hourglass import Hourglass
 from charnerf.models.mlp import ResidualBlock
 from support import helpers, small_runs
 
-ONE = ("sampling.train_splits=[train]", "sampling.val_split=train", "sampling.val_characters=1",
-       "sampling.num_validations=1", "encoder=single", "scale.steps=2")  # fmt: skip
+ONE = ("splits.train=[train]", "splits.val=train", "validation.characters=1",
+       "validation.times=1", "encoder=single", "scale.steps=2")  # fmt: skip
 
 
 def built(*overrides: str) -> nn.Module:

@@ -15,7 +15,7 @@ SETTINGS = (
     "schedule=two_phase",
     "augmentation=stretch_recolor",
     "scale.steps=6",
-    "sampling.num_validations=3",
+    "validation.times=3",
 )
 forks = pytest.mark.skipif(
     "fork" not in multiprocessing.get_all_start_methods(), reason="this system can not fork processes"
@@ -26,7 +26,7 @@ forks = pytest.mark.skipif(
 def test_a_worker_makes_the_same_run(figure_dataset, tmp_path):
     runs = [
         small_runs.assemble(
-            small_runs.smoke_config(figure_dataset, *SETTINGS, f"sampling.workers={workers}"),
+            small_runs.smoke_config(figure_dataset, *SETTINGS, f"batches.workers={workers}"),
             tmp_path / str(workers),
         ).fit()
         for workers in (0, 1)
@@ -48,7 +48,7 @@ def test_an_error_of_a_worker_is_the_same_error(figure_dataset, tmp_path):
     cfg = small_runs.smoke_config(root, *SETTINGS)
     said = []
     for workers in (0, 1):
-        cfg.sampling.workers = workers
+        cfg.batches.workers = workers
         with pytest.raises(DataError, match=picture.name) as caught:
             small_runs.assemble(cfg, tmp_path / str(workers)).fit()
         said.append(str(caught.value))
@@ -64,5 +64,5 @@ def test_a_cpu_makes_its_batches_itself_unless_told_otherwise(figure_dataset, tm
 
 def test_workers_where_nothing_forks_are_refused(figure_dataset, tmp_path, monkeypatch):
     monkeypatch.setattr(multiprocessing, "get_all_start_methods", lambda: ["spawn"])
-    with pytest.raises(ConfigError, match=r"sampling\.workers: found 2.*sampling\.workers=0"):
-        small_runs.assemble(small_runs.smoke_config(figure_dataset, "sampling.workers=2"), tmp_path)
+    with pytest.raises(ConfigError, match=r"batches\.workers: found 2.*batches\.workers=0"):
+        small_runs.assemble(small_runs.smoke_config(figure_dataset, "batches.workers=2"), tmp_path)

@@ -51,21 +51,45 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class Sampling:
-    """What training and validation draw from the data."""
+class Splits:
+    """Which splits of the data set are trained on, validated on and tested on."""
+
+    train: list[str]
+    val: str
+    test: str
+
+
+@dataclass(frozen=True)
+class Batches:
+    """How training batches are made."""
 
     foreground_share: Share
-    space_points: CountOrZero
-    train_splits: list[str]
-    val_split: str
-    test_split: str
-    val_characters: Count | None
-    val_views: Count
-    num_validations: Count
-    surface_delta: Annotated[float, Above(0)] | None
     memory_mib: Annotated[float, Above(0)]
     workers: CountOrZero | None
-    final_rate: Share
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """What loss terms ask of points in space and on the surface."""
+
+    space_points: CountOrZero
+    surface_delta: Annotated[float, Above(0)] | None
+
+
+@dataclass(frozen=True)
+class Validation:
+    """How often a run is validated, and on how much."""
+
+    times: Count
+    characters: Count | None
+    views: Count
+
+
+@dataclass(frozen=True)
+class Optimization:
+    """What every optimizer does alike."""
+
+    final_lr_scale: Share
     gradient_clip: Annotated[float, Above(0)] | None
 
 
@@ -126,7 +150,11 @@ class RunConfig:
     features: _part("charnerf.models.features")  # type: ignore[valid-type]
     quadrature: _part("charnerf.volume.quadrature")  # type: ignore[valid-type]
     renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
+    splits: Splits
+    batches: Batches
     sampling: Sampling
+    validation: Validation
+    optimization: Optimization
     averaging: Averaging
     surface_dirs: _part("charnerf.losses")  # type: ignore[valid-type]
     surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]

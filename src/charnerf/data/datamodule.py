@@ -59,8 +59,8 @@ class MixedDataModule(L.LightningDataModule):
         super().__init__()
         if workers and not _can_fork():
             raise ConfigError(
-                f"sampling.workers: found {workers}, but this system can not fork processes, expected 0 or null; "
-                "set sampling.workers=0."
+                f"batches.workers: found {workers}, but this system can not fork processes, expected 0 or null; "
+                "set batches.workers=0."
             )
         info = read_dataset(root)
         train = [name for split in train_splits for name in names_of(info, split)]

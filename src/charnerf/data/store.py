@@ -125,7 +125,7 @@ class CharacterStore:
         opened, wanted = len(self._open), len(set(self.names))
         needed = self._used_bytes / opened * wanted / 2**20
         log.warning(
-            "sampling.memory_mib=%.0f holds about %d of %d characters; the others are opened anew at each turn, %.2f s each. "
-            "sampling.memory_mib=%.0f would hold all; sampling.workers=1 opens them beside the training.",
+            "batches.memory_mib=%.0f holds about %d of %d characters; the others are opened anew at each turn, %.2f s each. "
+            "batches.memory_mib=%.0f would hold all; batches.workers=1 opens them beside the training.",
             self.memory_bytes / 2**20, max(opened - 1, 1), wanted, self._seconds / opened, 1.05 * needed,
         )  # fmt: skip

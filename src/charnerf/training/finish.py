@@ -58,17 +58,17 @@ def finish_run(
         model,
         renderer,
         root,
-        cfg.sampling.test_split,
+        cfg.splits.test,
         views=cfg.scale.eval_views or "all",
         output=folder,
         mesh=make_mesh,
         device=device,
-        nearest=TrainingCharacters([(root, split) for split in cfg.sampling.train_splits]),
+        nearest=TrainingCharacters([(root, split) for split in cfg.splits.train]),
         train_seconds=train_seconds,
     )
     size = sum(parameter.numel() for parameter in model.parameters())
     write_metrics(folder / "metrics.json", {**metrics, "num_parameters": size, "steps": trainer.global_step})
-    first = names_of(read_dataset(root), cfg.sampling.test_split)[0]
+    first = names_of(read_dataset(root), cfg.splits.test)[0]
     write_first_mesh(folder, root, first, model, trainer)
     report = write_run_report(folder)
     beside = metrics["baselines"]["visual_hull"]

@@ -67,7 +67,7 @@ class WhiteAlarm(L.Callback):
         if self.empty_steps == PATIENCE:
             log.warning(
                 "Training collapsed to white: the mean opacity on the character has been below %.2f for %d steps. Raise "
-                "sampling.foreground_share, lower optimizer.lr, or use a softplus density.",
+                "batches.foreground_share, lower optimizer.lr, or use a softplus density.",
                 COLLAPSED_OPACITY,
                 PATIENCE,
             )

@@ -60,7 +60,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     model = build_model(cfg)
     start = begin(model, cfg) if checkpoint is None else None
     root = build_part(cfg.data).prepare(depth=reads(cfg, losses, "depth"))
-    check_data(root, cfg.sampling, cfg.scale.image_size)
+    check_data(root, cfg.splits, cfg.scale.image_size)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = TrainingModule(
@@ -70,7 +70,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         losses=losses,
         surface_dirs=build_part(cfg.surface_dirs),
         optimizer=build_part(cfg.optimizer),
-        final_rate=cfg.sampling.final_rate,
+        final_rate=cfg.optimization.final_lr_scale,
         position=clock.position,
         surface_delta=surface_delta(cfg),
         seed=cfg.seed,
@@ -93,12 +93,12 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
 
 
-def check_data(root: Path, sampling: DictConfig, size: int) -> None:
+def check_data(root: Path, splits: DictConfig, size: int) -> None:
     """Check what would end a run late, or make its weights useless.
 
     Args:
         root: Data set.
-        sampling: The config's.
+        splits: The config's.
         size: Width of the drawings that `charnerf reconstruct` will give the encoder, pixels.
 
     Raises:
@@ -106,10 +106,7 @@ def check_data(root: Path, sampling: DictConfig, size: int) -> None:
         ConfigError: If the first character's drawings have another size.
     """
     info = read_dataset(root)
-    first, *_ = [
-        names_of(info, split)[0]
-        for split in (*sampling.train_splits, sampling.val_split, sampling.test_split)
-    ]
+    first, *_ = [names_of(info, split)[0] for split in (*splits.train, splits.val, splits.test)]
     cameras = load_character(root, first).sources.cameras
     found = max(cameras.width, cameras.height)
     if found != size:
@@ -123,14 +120,14 @@ def build_data(
     cfg: DictConfig, root: Path, model: CharNeRF, clock: RunClock, losses: WeightedLosses
 ) -> MixedDataModule:
     """The datamodule; what no loss reads is not opened."""
-    sampling = cfg.sampling
+    splits, batches, validation = cfg.splits, cfg.batches, cfg.validation
 
     def make_dataset(store: CharacterStore) -> MixedDataset:
         return MixedDataset(
             store=store,
             characters=cfg.scale.batch_characters,
-            foreground_share=sampling.foreground_share,
-            space_points=sampling.space_points if reads(cfg, losses, "occupancy") else 0,
+            foreground_share=batches.foreground_share,
+            space_points=cfg.sampling.space_points if reads(cfg, losses, "occupancy") else 0,
             reads_depth=reads(cfg, losses, "depth"),
             used_views=model.views,
             augmentation=build_part(cfg.augmentation, {"used_views": model.views}),
@@ -139,17 +136,17 @@ def build_data(
 
     return MixedDataModule(
         root=root,
-        train_splits=list(sampling.train_splits),
-        val_split=sampling.val_split,
-        val_characters=sampling.val_characters,
-        val_views=sampling.val_views,
+        train_splits=list(splits.train),
+        val_split=splits.val,
+        val_characters=validation.characters,
+        val_views=validation.views,
         carve=model.carve,
-        memory_mib=sampling.memory_mib,
-        workers=sampling.workers,
+        memory_mib=batches.memory_mib,
+        workers=batches.workers,
         surface_of=_surface_of(cfg, losses),
         make_dataset=make_dataset,
         sampler=PhaseSampler(
-            schedule=build_part(cfg.schedule), position=clock.position, num_marks=sampling.num_validations
+            schedule=build_part(cfg.schedule), position=clock.position, num_marks=validation.times
         ),
     )
 
@@ -215,7 +212,7 @@ def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
             "enable_progress_bar": False,
             "enable_model_summary": False,
             "use_distributed_sampler": False,
-            "gradient_clip_val": cfg.sampling.gradient_clip,
+            "gradient_clip_val": cfg.optimization.gradient_clip,
             "log_every_n_steps": 20,
         },
     )
