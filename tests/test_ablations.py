@@ -1,4 +1,4 @@
-"""The sweeps that docs/ablations.md writes down compose: the last cell of each."""
+"""The sweeps that docs/results.md writes down compose: the last cell of each."""
 
 import re
 import shlex
@@ -9,7 +9,7 @@ import pytest
 from charnerf.config import composition
 
 ROOT = Path(__file__).resolve().parents[1]
-TEXT = (ROOT / "docs/ablations.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs/results.md").read_text(encoding="utf-8")
 TABLE = TEXT[TEXT.index("## Further ablations") : TEXT.index("## The report")]
 SWEEPS = [piece for piece in re.findall(r"`([^`]+)`", TABLE) if "," in piece]
 

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from charnerf.meshing.export import save_mesh as save_mesh
 
 # Before torch starts its threads: on busy cores threads that spin for one another take the time that those waited for need.
-# A hundred thousand turns: fewer cost time on idle cores, see docs/benchmarks.md.
+# A hundred thousand turns: fewer cost time on idle cores, see docs/speed.md.
 os.environ.setdefault("GOMP_SPINCOUNT", "100000")
 
 try:

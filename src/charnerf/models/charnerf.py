@@ -194,7 +194,7 @@ class CharNeRF(nn.Module):
     def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
         """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
         size = (maps.shape[-1], maps.shape[-2])
-        # in training the field learns the outlines by itself: with them it came to 0.2 dB less foreground (docs/ablations.md)
+        # in training the field learns the outlines by itself: with them it came to 0.2 dB less foreground (docs/results.md)
         outlines = hull is not None and not self.training
         return ViewMaps.of(
             views, hull, present, size, sections=self.features.reads_sections, coverage=outlines
