@@ -13,7 +13,8 @@ MAX_LINES = 400
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
     ("errors",),
-    ("types", "checks", "schedule"),
+    ("types", "checks", "schedule", "files", "markdown"),
+    ("pictures",),
     ("geometry",),
     ("config", "losses", "models", "surfaces", "volume"),
     ("data", "meshing", "procedural"),

@@ -11,7 +11,7 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.environment import environment
 from charnerf.evaluation.mesh_scores import score_split, score_text
 from charnerf.evaluation.timing import process_peak_mib
-from charnerf.meshing.export import write_aside
+from charnerf.files import write_text
 from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 
 
@@ -45,7 +45,7 @@ def measure(
     setting = {"split": split, "grid": request.resolutions[0], "faces": faces, "texels": request.texture_size}
     facts = {**setting, **environment(model.device), "peak_memory_mib": round(process_peak_mib())}
     text = score_text(rows, facts)
-    write_aside(output / "meshes.md", text.encode())
+    write_text(output / "meshes.md", text)
     record = {"facts": facts, "characters": rows}
-    write_aside(output / "meshes.json", (json.dumps(record, indent=2) + "\n").encode())
+    write_text(output / "meshes.json", json.dumps(record, indent=2) + "\n")
     sys.stdout.write(text)

@@ -4,8 +4,8 @@ import torch
 from charnerf.evaluation import metrics
 from charnerf.evaluation.baselines import VisualHullBaseline, signed_edge_distances, white_prediction
 from charnerf.evaluation.ray_mesh import RayMesh
-from charnerf.evaluation.scores import on_white
 from charnerf.evaluation.surface_error import seen_points, surface_scores
+from charnerf.pictures import on_white
 from charnerf.types import SourceViews
 from support.figures import SIZE, figure, photograph, source_views, target_cameras
 
@@ -43,7 +43,7 @@ def test_hull_reproduces_the_silhouettes_and_the_drawings(case):
         sure = (alpha - 0.5).abs() > 0.35  # pixels that the edge does not halve
         assert metrics.silhouette_iou(picture.opacity[sure], alpha[sure]) > 0.995
         assert float((picture.opacity - alpha).abs().sum() / alpha.sum()) < 0.08
-        truth = on_white(views.images[0, index].movedim(0, -1) * 255.0)[0]
+        truth = on_white(views.images[0, index].movedim(0, -1))
         assert metrics.psnr(picture.rgb, truth) > 25.0
 
 
@@ -62,7 +62,8 @@ def test_hull_holds_the_object(case):
 def test_hull_is_drawn_from_any_camera_in_the_colours_of_the_drawings(case):
     mesh, _, hull = case
     for camera in (target_cameras(9)[5], target_cameras(9)[8]):
-        truth, alpha = on_white(photograph(mesh, camera))
+        rgba = photograph(mesh, camera) / 255.0
+        truth, alpha = on_white(rgba), rgba[..., 3]
         picture = hull.render(camera)
         assert metrics.silhouette_iou(picture.opacity, alpha) > 0.75
         assert metrics.psnr_foreground(picture.rgb, truth, alpha) > 12.0

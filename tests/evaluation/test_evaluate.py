@@ -15,7 +15,8 @@ from charnerf.evaluation import evaluate as evaluation
 from charnerf.evaluation import metrics
 from charnerf.evaluation.angles import azimuth_bin, view_angles
 from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
-from charnerf.evaluation.scores import METRIC_KEYS, on_white
+from charnerf.evaluation.scores import METRIC_KEYS
+from charnerf.pictures import on_white
 from charnerf.types import LeftOut, RenderOutput
 from support.figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
 
@@ -96,8 +97,8 @@ def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):
     again = []
     for index in fixed_views(character, 4):
         kept = output / "images" / "doll" / f"{index:03d}.png"
-        prediction = on_white(torch.from_numpy(np.array(Image.open(kept))))[0]
-        again.append(metrics.psnr(prediction, on_white(character.images([index])[0])[0]))
+        prediction = on_white(torch.from_numpy(np.array(Image.open(kept)) / 255.0)).float()
+        again.append(metrics.psnr(prediction, on_white(character.images([index])[0] / 255.0)))
     assert np.mean(again) == pytest.approx(found["per_character"]["doll"]["psnr"], abs=0.05)
     assert (output / "images" / "doll" / "sheet.png").is_file()
 

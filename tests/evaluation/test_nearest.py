@@ -11,7 +11,8 @@ from charnerf.evaluation import metrics
 from charnerf.evaluation.baselines import VisualHullBaseline
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.nearest import NearestBaseline, TrainingCharacters, filled_drawings
-from charnerf.evaluation.scores import METRIC_KEYS, on_white
+from charnerf.evaluation.scores import METRIC_KEYS
+from charnerf.pictures import on_white
 from support.figures import HullModel, HullRenderer, WhiteRenderer, write_figure
 
 
@@ -53,7 +54,8 @@ def test_with_the_right_shape_every_picture_is_better_than_the_hulls(training, f
     hull = VisualHullBaseline(doll.sources)
     best = 0.0
     for index in range(7):
-        truth, alpha = on_white(doll.images([index])[0])
+        rgba = doll.images([index])[0] / 255.0
+        truth, alpha = on_white(rgba), rgba[..., 3]
         ours, carved = (one.render(doll.cameras[index]) for one in (drawn, hull))
         assert metrics.silhouette_iou(ours.opacity, alpha) > metrics.silhouette_iou(carved.opacity, alpha)
         found = metrics.psnr_foreground(ours.rgb, truth, alpha)

@@ -25,7 +25,8 @@ from charnerf.models.charnerf import HULL_DEPTH_FADE, CharNeRF, EncodedViews
 from charnerf.models.features.base import ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
-from charnerf.models.view_maps import kept_share, on_white, widened_coverage
+from charnerf.models.view_maps import kept_share, widened_coverage
+from charnerf.pictures import images_on_white
 from charnerf.types import FieldOutput, Hull, RayBundle, RenderOutput, SourceViews
 from charnerf.volume.compositing import composite, expected_depth, weights_from_densities
 
@@ -56,7 +57,7 @@ class PixelAligned:
         carving, coverage = (views.present & ~views.mirrored).nonzero()[:, 0], None
         if hull is not None:
             coverage = widened_coverage(views.images[carving, 3:], hull.dilations[carving])
-        pictures = on_white(views.images)
+        pictures = images_on_white(views.images)
         return cls(views, encoded.feature_maps[index], pictures, hull, maps, sections, carving, coverage)
 
 

@@ -11,8 +11,8 @@ from charnerf.bench.baseline import NUM_COARSE, NUM_FINE
 from charnerf.bench.rendering import BASELINE
 from charnerf.bench.tables import comparison_table, headline_table, markdown
 from charnerf.bench.targets import target_rows
-from charnerf.data.layout import write_text_atomically
 from charnerf.errors import DataError
+from charnerf.files import write_text
 
 BEGIN, END = "<!-- figures: written by `charnerf bench` -->", "<!-- end of figures -->"
 TITLE = "# Error against run time"
@@ -40,7 +40,7 @@ def write_page(page: Path, parts: Sequence[dict[str, Any]], *, pictures: Path) -
     end = text.index(END, start)
     page.parent.mkdir(parents=True, exist_ok=True)
     folder = os.path.relpath(pictures, page.parent)
-    write_text_atomically(page, f"{text[:start]}{BEGIN}\n\n{measured(parts, Path(folder))}\n\n{text[end:]}")
+    write_text(page, f"{text[:start]}{BEGIN}\n\n{measured(parts, Path(folder))}\n\n{text[end:]}")
 
 
 def measured(parts: Sequence[dict[str, Any]], pictures: Path) -> str:

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from charnerf.bench.sweeps import Row, pareto
+from charnerf.files import write_aside
 
 LEAST_ERROR = 1e-7  # drawn: an empty picture has none
 
@@ -115,9 +116,7 @@ def plot_growth(growths: Sequence[Mapping[str, Any]], path: Path) -> Path:
 
 
 def _save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG, beside and then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.name}.part")
-    FigureCanvasAgg(figure).print_figure(aside, format="png", dpi=110)
-    aside.replace(path)
+    """Write a figure as PNG, whole or not at all."""
+    with write_aside(path) as aside:
+        FigureCanvasAgg(figure).print_figure(aside, format="png", dpi=110)
     return path

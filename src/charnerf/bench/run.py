@@ -19,6 +19,7 @@ from charnerf.bench.tables import comparison_table, headline_table, markdown
 from charnerf.bench.workbench import workbench
 from charnerf.errors import ConfigError
 from charnerf.evaluation.environment import environment
+from charnerf.files import write_text
 from charnerf.inference.model import Model
 
 NUMBERS, PAGE = "bench.json", "bench.md"
@@ -130,11 +131,8 @@ def run_roofline(model: Model, request: Request, say: Callable[[str], None]) -> 
 
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
-    """Write results, beside and then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.name}.tmp")
-    aside.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    aside.replace(path)
+    """Write results, whole or not at all."""
+    write_text(path, json.dumps(result, indent=2) + "\n")
 
 
 def summary(result: dict[str, Any]) -> str:

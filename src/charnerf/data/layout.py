@@ -10,7 +10,6 @@ Names of folders that begin with a dot are characters being written; nothing rea
 import json
 import os
 import re
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from charnerf.errors import DataError
+from charnerf.files import write_text
 
 FORMAT = "charnerf-dataset"
 VERSION = 1
@@ -73,19 +73,6 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise DataError(f"{path}: found a JSON {type(content).__name__}, expected an object.")
     return content
-
-
-def write_text_atomically(path: Path, text: str) -> None:
-    """Write a text file aside and rename it: readers see the old file or the new one, never a part."""
-    handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.chmod(aside, 0o644)
-        os.replace(aside, path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
 
 
 def read_dataset(root: str | Path) -> DatasetInfo:
@@ -154,7 +141,7 @@ def write_dataset(info: DatasetInfo) -> None:
         "splits": {split: list(names) for split, names in info.splits.items()},
         "made_by": info.made_by,
     }
-    write_text_atomically(info.root / DATASET_FILE, json.dumps(content, indent=1) + "\n")
+    write_text(info.root / DATASET_FILE, json.dumps(content, indent=1) + "\n")
 
 
 def open_or_new(root: str | Path) -> DatasetInfo:

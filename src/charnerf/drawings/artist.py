@@ -10,6 +10,7 @@ from PIL import Image
 from charnerf.capture.embree import capture_sources
 from charnerf.data.characters import SOURCE_ORDER, Character
 from charnerf.data.drawing_style import draw_pictures, random_style
+from charnerf.pictures import save_png
 from charnerf.surfaces.mesh_files import load_surface_mesh
 
 PAPER = (252, 251, 247)
@@ -44,12 +45,7 @@ def draw_character(character: Character, *, size: int, seed: int) -> dict[str, n
 
 def write_drawings(drawings: dict[str, np.ndarray], folder: Path) -> list[Path]:
     """Write FOLDER/front.png, side.png, back.png."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = []
-    for name, pixels in drawings.items():
-        file = folder / f"{name}.png"
-        aside = file.with_name(f".{file.name}.part")
-        Image.fromarray(pixels).save(aside, format="PNG")
-        aside.replace(file)
-        files.append(file)
+    files = [folder / f"{name}.png" for name in drawings]
+    for file, pixels in zip(files, drawings.values(), strict=True):
+        save_png(file, Image.fromarray(pixels))
     return files

@@ -15,8 +15,9 @@ import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character
-from charnerf.data.layout import read_json, write_text_atomically
+from charnerf.data.layout import read_json
 from charnerf.errors import ConfigError, DataError
+from charnerf.files import write_text
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles, pixel_centres, pixel_rays
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.combinators.base import masked_logits, view_weights
@@ -192,7 +193,7 @@ def _recorded(combinator: ViewAttention) -> Iterator[list[_Call]]:
 
 def write_profile(path: Path, profile: AttentionProfile) -> None:
     """Write a profile as JSON, in one step."""
-    write_text_atomically(path, json.dumps(asdict(profile)) + "\n")
+    write_text(path, json.dumps(asdict(profile)) + "\n")
 
 
 def read_profile(path: Path) -> AttentionProfile:

@@ -13,9 +13,11 @@ import trimesh
 from charnerf.data.characters import Character
 from charnerf.evaluation.baselines import VisualHullBaseline
 from charnerf.evaluation.surface_error import surface_scores, true_points
+from charnerf.markdown import table
 from charnerf.meshing.build import find_surface, finish_mesh
 from charnerf.meshing.picture import render_mesh
 from charnerf.meshing.texture import Texturing
+from charnerf.pictures import on_white
 from charnerf.types import Cameras, Scene
 
 KINDS = ("drawings", "field", "vertex")
@@ -70,17 +72,13 @@ def _picture_scores(mesh: trimesh.Trimesh, cameras: Cameras, truth: np.ndarray) 
         both = (found[..., 3] > WHOLE) & (true[..., 3] > WHOLE)
         inside = true[..., 3] > 0.5
         squared = (found[..., :3] - true[..., :3]) ** 2
-        on_white = (_on_white(found) - _on_white(true)) ** 2
+        squared_on_white = (on_white(found) - on_white(true)) ** 2
         hit = found[..., 3] > 0.5
         union = (hit | inside).sum()
         iou = (hit & inside).sum() / union if union else 1.0
-        rows.append((_decibels(squared[both]), _decibels(on_white[inside]), float(iou)))
+        rows.append((_decibels(squared[both]), _decibels(squared_on_white[inside]), float(iou)))
     means = np.nanmean(np.array(rows, np.float64), axis=0)
     return dict(zip(("texture_psnr", "psnr_foreground", "iou"), map(float, means), strict=True))
-
-
-def _on_white(rgba: np.ndarray) -> np.ndarray:
-    return rgba[..., :3] * rgba[..., 3:] + 1.0 - rgba[..., 3:]
 
 
 def _decibels(squared: np.ndarray) -> float:
@@ -97,14 +95,14 @@ def score_table(rows: dict[str, dict[str, Any]]) -> str:
     keys += ["texels_from_field", "surface_seconds", "drawings_seconds"]
     forms = [*["{:.2f}"] * 6, "{:.3f}", "{:.1f}", "{:.3f}", "{:.3f}", "{:.1f}", "{:.3f}", "{:.2f}"]
     forms += ["{:.1f}", "{:.1f}"]
-    lines = ["| | in source views, dB | | | in novel views, dB |" + " |" * 11]
-    lines += ["|---" * 16 + "|", "| " + " | ".join(heads) + " |"]
+    table_rows = [heads]
     every = {**rows, "**mean**": {key: mean_of(rows.values(), key) for key in keys}}
     for name, row in every.items():
         values = [row.get(key) for key in keys]
         cells = ["-" if v is None else form.format(v) for v, form in zip(values, forms, strict=True)]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        table_rows.append([name, *cells])
+    groups = ["", "in source views, dB", "", "", "in novel views, dB", *[""] * 11]
+    return "\n".join(table(groups, table_rows))
 
 
 def score_text(rows: dict[str, dict[str, Any]], facts: dict[str, Any]) -> str:

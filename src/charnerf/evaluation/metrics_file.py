@@ -9,11 +9,11 @@ from typing import Any, final
 
 import torch
 
-from charnerf.data.layout import write_text_atomically
 from charnerf.evaluation.angles import by_azimuth, by_elevation, by_source_angle
 from charnerf.evaluation.environment import environment
 from charnerf.evaluation.scores import ANGLE_KEYS, VIEW_KEYS, CharacterScores, summarize
 from charnerf.evaluation.timing import Stopwatch, process_peak_mib
+from charnerf.files import write_text
 from charnerf.types import LeftOut
 
 VIEWS_FILE = "views.csv"
@@ -118,7 +118,7 @@ def write_metrics(path: str | Path, metrics: dict[str, Any]) -> None:
     Raises:
         ValueError: If a number is NaN or infinite, which JSON can not say.
     """
-    write_text_atomically(Path(path), json.dumps(metrics, indent=2, allow_nan=False) + "\n")
+    write_text(Path(path), json.dumps(metrics, indent=2, allow_nan=False) + "\n")
 
 
 def write_views(path: Path, state: Collected) -> None:
@@ -131,4 +131,4 @@ def write_views(path: Path, state: Collected) -> None:
             for frame, record in zip(scores.frames, scores.views, strict=True):
                 table.writerow((method, name, frame, *(record[key] for key in (*ANGLE_KEYS, *VIEW_KEYS))))
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text_atomically(path, text.getvalue())
+    write_text(path, text.getvalue())

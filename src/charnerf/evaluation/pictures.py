@@ -3,14 +3,13 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 
 from charnerf.data.characters import Character
 from charnerf.evaluation.angles import view_angles
-from charnerf.evaluation.scores import on_white
+from charnerf.pictures import on_white, save_png, to_bytes
 from charnerf.types import RenderOutput
 
 _SHEET_COLUMNS = 8
@@ -19,24 +18,11 @@ _HEADER = 16
 _INK = (60, 60, 60)
 
 
-def to_bytes(values: Tensor) -> np.ndarray:
-    """Numbers in [0, 1] as bytes of the same shape."""
-    return (values.detach().clamp(0.0, 1.0) * 255.0).round().to(torch.uint8).cpu().numpy()
-
-
-def save_picture(path: Path, picture: Image.Image) -> None:
-    """Write a PNG in one step, with the folders it needs."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.name}.part")
-    picture.save(aside, format="PNG")
-    aside.replace(path)
-
-
 def save_prediction(path: Path, prediction: RenderOutput) -> None:
     """Keep a prediction (H, W) as RGBA with straight alpha, so that a metric can be added later."""
     alpha = prediction.opacity[..., None]
     straight = (prediction.rgb - (1.0 - alpha)) / alpha.clamp_min(1.0 / 255.0)
-    save_picture(path, Image.fromarray(to_bytes(torch.cat((straight, alpha), dim=-1))))
+    save_png(path, Image.fromarray(to_bytes(torch.cat((straight, alpha), dim=-1))))
 
 
 def depth_picture(prediction: RenderOutput) -> Tensor:
@@ -55,7 +41,7 @@ def _panels(
     """Rows of the sheet: label and pictures (H, W, 3)."""
     ours = [drawn["ours"][place] for place in chosen]
     rows = [
-        ("truth", [on_white(images[place])[0] for place in chosen]),
+        ("truth", [on_white(images[place].float() / 255.0) for place in chosen]),
         ("prediction", [picture.rgb for picture in ours]),
     ]
     if "visual_hull" in drawn:
@@ -97,7 +83,7 @@ def save_sheet(
     for place, name in enumerate(character.source_names):
         pen.text((_LABEL_WIDTH + place * width + 4, 1), name, _INK, font)
         source = character.sources.images[0, place].movedim(0, -1)
-        shown = Image.fromarray(to_bytes(on_white(source * 255.0)[0])).resize((width, height))
+        shown = Image.fromarray(to_bytes(on_white(source))).resize((width, height))
         sheet.paste(shown, (_LABEL_WIDTH + place * width, _HEADER))
     top = height + _HEADER
     for column, place in enumerate(chosen):
@@ -109,4 +95,4 @@ def save_sheet(
         pen.text((4, y + height // 2), label, _INK, font)
         for column, picture in enumerate(pictures):
             sheet.paste(Image.fromarray(to_bytes(picture)), (_LABEL_WIDTH + column * width, y))
-    save_picture(path, sheet)
+    save_png(path, sheet)

@@ -15,10 +15,11 @@ import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character
-from charnerf.data.layout import read_json, write_text_atomically
+from charnerf.data.layout import read_json
 from charnerf.data.surface import load_surface_mesh
 from charnerf.errors import DataError
 from charnerf.evaluation.evaluate import fixed_views
+from charnerf.files import write_text
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
@@ -262,7 +263,7 @@ def _histogram(weights: Tensor, behind: Tensor) -> Tensor:
 
 def write_ray_weights(path: Path, found: RayWeights) -> None:
     """Write what was measured as JSON, in one step."""
-    write_text_atomically(path, json.dumps(asdict(found)) + "\n")
+    write_text(path, json.dumps(asdict(found)) + "\n")
 
 
 def read_ray_weights(path: Path) -> RayWeights:

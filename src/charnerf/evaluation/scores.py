@@ -10,6 +10,7 @@ from torch import Tensor
 from charnerf.checks import check_finite
 from charnerf.evaluation import metrics
 from charnerf.evaluation.angles import Record, mean_of, mean_over_characters
+from charnerf.pictures import on_white
 from charnerf.types import RenderOutput
 
 VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou")
@@ -35,13 +36,6 @@ class CharacterScores:
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-def on_white(image: Tensor) -> tuple[Tensor, Tensor]:
-    """An RGBA picture of bytes (H, W, 4) as colours on white (H, W, 3) and alpha (H, W), in [0, 1]."""
-    rgba = image.float() / 255.0
-    alpha = rgba[..., 3]
-    return rgba[..., :3] * alpha[..., None] + (1.0 - alpha[..., None]), alpha
-
-
 def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
     """A rendering on the CPU in float32, clamped to [0, 1] after the check that it is finite.
 
@@ -56,7 +50,8 @@ def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
 
 def score_view(prediction: RenderOutput, image: Tensor, angles: Record, *, reasons: dict[str, str]) -> Record:
     """All metrics of a prediction against the true bytes (H, W, 4); notes in `reasons` why one is missing."""
-    truth, alpha = on_white(image)
+    rgba = image.float() / 255.0
+    truth, alpha = on_white(rgba), rgba[..., 3]
     perceptual, why = metrics.lpips(prediction.rgb, truth)
     if why is not None:
         reasons["lpips"] = why

@@ -15,6 +15,7 @@ from charnerf.drawings.turnaround import Turnaround
 from charnerf.finetuning.finetune import LEARNING, CurvePoint, Finetuned
 from charnerf.finetuning.recipe import Recipe
 from charnerf.inference.weights import save_config, save_weights
+from charnerf.markdown import table
 
 ROWS = 12  # of the curve shown in the report; curve.csv has all
 OURS, LIKENESS = "#1f5fa8", "#b8641f"
@@ -108,19 +109,17 @@ def summary_lines(done: Finetuned) -> list[str]:
 
 def curve_table(done: Finetuned) -> list[str]:
     """Error against seconds as Markdown rows, thinned out."""
-    lines = ["| seconds | step | held-out error | held-out PSNR, dB | novel views to the start, dB |"]
-    lines += ["|---|---|---|---|---|"]
+    heads = ("seconds", "step", "held-out error", "held-out PSNR, dB", "novel views to the start, dB")
+    rows = []
     every = max(1, -(-len(done.curve) // ROWS))
     for index, point in enumerate(done.curve):
         if index % every and point is not done.best and index != len(done.curve) - 1:
             continue
         mark = "**" if point.step == done.best.step else ""
         likeness = f"{point.likeness:.1f}" if math.isfinite(point.likeness) else "equal"
-        lines.append(
-            f"| {point.seconds:.1f} | {mark}{point.step}{mark} | {point.held_out:.5f} | "
-            f"{point.held_out_psnr:.2f} | {likeness} |"
-        )
-    return lines
+        cells = [f"{point.seconds:.1f}", f"{mark}{point.step}{mark}", f"{point.held_out:.5f}"]
+        rows.append([*cells, f"{point.held_out_psnr:.2f}", likeness])
+    return table(heads, rows)
 
 
 def report_text(done: Finetuned, recipe: Recipe, drawings: Turnaround | None) -> str:
@@ -136,14 +135,12 @@ def report_text(done: Finetuned, recipe: Recipe, drawings: Turnaround | None) ->
         "",
         "## Recipe",
         "",
-        "| setting | value |",
-        "|---|---|",
-        *(f"| {name} | {value} |" for name, value in asdict(recipe).items()),
+        *table(("setting", "value"), [(name, str(value)) for name, value in asdict(recipe).items()]),
         "",
     ]
     if drawings is not None:
         lines += ["## What was assumed about the drawings", "", *(f"- {one}" for one in drawings.assumptions)]
         lines += [*(f"- **warning**: {one}" for one in drawings.warnings), ""]
-    lines += ["## Seconds", "", "| stage | seconds |", "|---|---|"]
-    lines += [f"| {stage} | {value:.1f} |" for stage, value in done.seconds.items()]
+    lines += ["## Seconds", ""]
+    lines += table(("stage", "seconds"), [(stage, f"{value:.1f}") for stage, value in done.seconds.items()])
     return "\n".join([*lines, ""])

@@ -2,7 +2,6 @@
 
 import inspect
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from yaml import YAMLError
 
 from charnerf.config import MODEL_SECTIONS, complete_model, validate_model
 from charnerf.errors import CharNeRFError, ConfigError, DataError
+from charnerf.files import write_aside, write_text
 from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.field import Field
@@ -156,22 +156,15 @@ def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig, *, note: st
     )
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
     metadata = {"format": FORMAT, "config": json.dumps(OmegaConf.to_container(chosen))}
-    file.parent.mkdir(parents=True, exist_ok=True)
-    aside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    try:
+    with write_aside(file) as aside:
         save_file(state, str(aside), metadata=metadata if note is None else {**metadata, "note": note})
-        os.replace(aside, file)
-    finally:
-        aside.unlink(missing_ok=True)
     return file
 
 
 def save_config(folder: Path, cfg: DictConfig) -> Path:
     """Write a run's composed config, interpolations resolved, as `config.yaml` of its folder."""
     file = folder / "config.yaml"
-    aside = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    aside.write_text(OmegaConf.to_yaml(cfg, resolve=True), encoding="utf-8")
-    os.replace(aside, file)
+    write_text(file, OmegaConf.to_yaml(cfg, resolve=True))
     return file
 
 

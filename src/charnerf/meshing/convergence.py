@@ -11,6 +11,7 @@ import torch
 import trimesh
 
 from charnerf.geometry.safe import safe_normalize
+from charnerf.markdown import table
 from charnerf.meshing.calibrate import choose_level
 from charnerf.meshing.density_grid import GridSampler, camera_positions
 from charnerf.meshing.distance import surface_chamfer_mm
@@ -153,12 +154,12 @@ def convergence_lines(result: Convergence) -> list[str]:
             "",
         ]
     lines += [f"Surfaces at {result.level:.3g} per metre; Chamfer distance to that of the most cameras.", ""]
-    lines += ["| cameras | distance, mm | volume, l | faces | seconds |", "|---|---|---|---|---|"]
+    rows = []
     for row in result.rows:
         name = f"{row.num_cameras}" if row.num_cameras else "none (zero direction)"
-        lines.append(
-            f"| {name} | {row.distance_mm:.2f} | {1000 * row.volume:.1f} | {row.num_faces} | {row.seconds:.1f} |"
-        )
+        cells = [name, f"{row.distance_mm:.2f}", f"{1000 * row.volume:.1f}"]
+        rows.append([*cells, f"{row.num_faces}", f"{row.seconds:.1f}"])
+    lines += table(("cameras", "distance, mm", "volume, l", "faces", "seconds"), rows)
     lines += [
         "",
         f"{result.enough} cameras are enough (within {SETTLED_MM:g} mm). Near the surface the density varies "

@@ -1,13 +1,12 @@
 """Meshes to files: axes and colour encoding as each format wants them, written aside and then renamed."""
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
 from charnerf.errors import DataError
+from charnerf.files import write_bytes
 from charnerf.meshing.gltf import encode_glb, encode_gltf
 from charnerf.meshing.obj import encode_obj
 from charnerf.meshing.parts import MeshParts, parts_of, welded
@@ -52,22 +51,9 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:
     files = _encode(parts_of(mesh, suffix, path.stem), suffix)
     for other, content in files.items():
         if other != suffix:
-            write_aside(path.with_suffix(other), content)
-    write_aside(path, files[suffix])
+            write_bytes(path.with_suffix(other), content)
+    write_bytes(path, files[suffix])
     return path
-
-
-def write_aside(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        Path(aside).chmod(0o644)
-        Path(aside).replace(path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
 
 
 def _encode(parts: MeshParts, suffix: str) -> dict[str, bytes]:

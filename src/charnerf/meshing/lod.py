@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from charnerf.errors import DataError
+from charnerf.markdown import table
 from charnerf.meshing.build import BuiltMesh, find_surface, finish_mesh
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.texture import Texturing
@@ -137,9 +138,9 @@ def named(lods: Sequence[Lod], name: str) -> dict[str, Lod]:
 
 def lod_table(files: dict[str, Lod]) -> str:
     """The table of levels as Markdown, the paper's values beside those grids that it has."""
-    heads = ("file", "grid", "vertices", "faces", "parts", "watertight", "Euler number", "Chamfer, mm")
-    lines = ["| " + " | ".join((*heads, "evaluated", "s", "paper: vertices, faces, Euler number")) + " |"]
-    lines.append("|---" * (len(heads) + 3) + "|")
+    heads = ["file", "grid", "vertices", "faces", "parts", "watertight", "Euler number", "Chamfer, mm"]
+    heads += ["evaluated", "s", "paper: vertices, faces, Euler number"]
+    rows = []
     for file, lod in files.items():
         row = lod.row()
         cells = [file, f"{row['grid']}", f"{row['vertices']}", f"{row['faces']}", f"{row['parts']}"]
@@ -148,8 +149,8 @@ def lod_table(files: dict[str, Lod]) -> str:
         cells += ["-" if share is None else f"{100 * share:.1f} %", f"{row['seconds']:.1f}"]
         paper = PAPER.get(lod.resolution) if lod.asked is None else None
         cells.append("-" if paper is None else f"{paper[0]}, {paper[1]}, {paper[0] - paper[1] // 2}")
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        rows.append(cells)
+    return "\n".join(table(heads, rows))
 
 
 def lod_report(files: dict[str, Lod]) -> str:

@@ -7,6 +7,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing.picture import render_clay, render_mesh
+from charnerf.pictures import on_white, to_bytes
 from charnerf.types import Cameras, SourceViews
 
 SIDES = 8
@@ -38,7 +39,9 @@ def contact_sheet(mesh: trimesh.Trimesh, views: SourceViews) -> Image.Image:
         top = row * (PANEL + CAPTION)
         for column, (label, picture) in enumerate(zip(labels, pictures, strict=True)):
             pen.text((column * PANEL + 4, top + 2), label, INK, font)
-            panel = Image.fromarray(_on_white(picture)).resize((PANEL, PANEL), Image.Resampling.LANCZOS)
+            panel = Image.fromarray(to_bytes(on_white(picture))).resize(
+                (PANEL, PANEL), Image.Resampling.LANCZOS
+            )
             sheet.paste(panel, (column * PANEL, top + CAPTION))
     return sheet
 
@@ -57,9 +60,3 @@ def around(mesh: trimesh.Trimesh, size: int = PANEL) -> Cameras:
         size=size,
         orthographic=False,
     )
-
-
-def _on_white(rgba: np.ndarray) -> np.ndarray:
-    """RGBA floats (H, W, 4) on white, RGB uint8."""
-    rgb = rgba[..., :3] * rgba[..., 3:] + 1.0 - rgba[..., 3:]
-    return np.round(255.0 * rgb.clip(0.0, 1.0)).astype(np.uint8)

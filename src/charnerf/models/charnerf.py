@@ -16,8 +16,9 @@ from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import Pictures, ViewMaps, kept_share, on_white
+from charnerf.models.view_maps import Pictures, ViewMaps, kept_share
 from charnerf.models.views.base import AbstractViews
+from charnerf.pictures import images_on_white
 from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
 
 BYTES_A_FEATURE = 64  # of a view and a point, gradient kept: some 16 tensors of float32; measured, generous
@@ -122,7 +123,7 @@ class CharNeRF(nn.Module):
             hull = self.carve(views)
         used = self.views(views)
         alpha = used.images[:, :, 3:]
-        pixels = torch.cat((2.0 * on_white(used.images) - 1.0, 2.0 * alpha - 1.0), dim=2).flatten(0, 1)
+        pixels = torch.cat((2.0 * images_on_white(used.images) - 1.0, 2.0 * alpha - 1.0), dim=2).flatten(0, 1)
         maps = self.encoder(pixels.contiguous(memory_format=torch.channels_last))
         return EncodedViews(
             views=used,
@@ -140,7 +141,7 @@ class CharNeRF(nn.Module):
                 f"detailed: found images {tuple(images.shape)}, expected the same views as {tuple(used.images.shape)}, of the "
                 "same proportions."
             )
-        return on_white(images)
+        return images_on_white(images)
 
     def scene(self, encoded: EncodedViews, index: int) -> Scene:
         """One character of a batch as a scene for a renderer; its absent views are dropped here."""

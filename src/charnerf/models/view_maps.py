@@ -15,6 +15,7 @@ from charnerf.geometry.cameras import directions_to_points, project_into_all
 from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
 from charnerf.geometry.resizing import resized_pictures
 from charnerf.models.lookup import bilinear_rows, first_pixels, maps_to_rows, read_rows
+from charnerf.pictures import images_on_white
 from charnerf.types import Cameras, Hull, SourceViews
 
 
@@ -96,7 +97,7 @@ class ViewMaps:
             sections: Whether to measure the hull's cross-sections.
             coverage: Whether to read the drawings' coverage, for `kept_share`.
         """
-        pictures, rows, size = on_white(views.images), None, (0, 0)
+        pictures, rows, size = images_on_white(views.images), None, (0, 0)
         carving, shown = (~views.mirrored).nonzero()[:, 0], None
         if coverage:
             dilations = None if hull is None else hull.dilations[present]
@@ -231,9 +232,3 @@ def widened_coverage(alphas: Tensor, dilations: Tensor | None) -> Tensor:
         for alpha, reach in zip(alphas, (dilations - 1.0).ceil().int().tolist(), strict=True)
     ]
     return torch.stack(widened)
-
-
-def on_white(images: Tensor) -> Tensor:
-    """Straight-alpha RGBA (..., 4, H, W) on white, (..., 3, H, W)."""
-    rgb, alpha = images[..., :3, :, :], images[..., 3:, :, :]
-    return rgb * alpha + (1.0 - alpha)

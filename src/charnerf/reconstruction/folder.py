@@ -19,9 +19,10 @@ from charnerf.inference.model import HEIGHT, TEXTURE_SIZE, Model, TextureKind
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
+from charnerf.pictures import bytes_on_white
 from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import mesh_sentences, mesh_words, report_text
-from charnerf.reconstruction.turntable import on_white, render_around, write_film
+from charnerf.reconstruction.turntable import render_around, write_film
 
 MOST_VIEWS = 12
 MESH_STEPS = 12  # of the progress bar, beside one a frame: what a mesh takes, about
@@ -141,7 +142,7 @@ def reconstruct(
         save_mesh(built.mesh, aside / "mesh.glb")
         (aside / "meshes").mkdir()
         contact_sheet(built.mesh, drawings.detailed).save(aside / "meshes" / "mesh_sheet.png")
-        film, film_note = write_film([on_white(picture) for picture in pictures], aside)
+        film, film_note = write_film([bytes_on_white(picture) for picture in pictures], aside)
         views = _write_views(pictures, aside / "views")
         Image.fromarray(drawings.picture).save(aside / "drawings.png")
         if refined is not None:

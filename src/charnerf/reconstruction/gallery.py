@@ -8,7 +8,8 @@ from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from charnerf.errors import DataError
 from charnerf.inference.model import Hero, Model
-from charnerf.reconstruction.turntable import ELEVATION_DEG, on_white
+from charnerf.pictures import bytes_on_white
+from charnerf.reconstruction.turntable import ELEVATION_DEG
 
 AZIMUTHS_DEG = (30, 60, 135, 225, 315)  # between and behind the drawings
 DRAWN = ("front", "side", "back")
@@ -92,11 +93,13 @@ def _left(column: int, size: int) -> int:
 def _fitted(file: Path, size: int) -> Image.Image:
     """A drawing as it was given, on white, in a square panel."""
     with Image.open(file) as opened:
-        pixels = on_white(np.asarray(ImageOps.exif_transpose(opened).convert("RGBA")))
+        pixels = bytes_on_white(np.asarray(ImageOps.exif_transpose(opened).convert("RGBA")))
     return ImageOps.pad(Image.fromarray(pixels), (size, size), Image.Resampling.LANCZOS, color="white")
 
 
 def _seen(hero: Hero, size: int) -> list[Image.Image]:
     """Novel views on white."""
     pictures = [hero.render(azimuth_deg=a, elevation_deg=ELEVATION_DEG, size=size) for a in AZIMUTHS_DEG]
-    return [Image.fromarray(on_white(np.rint(255.0 * picture).astype(np.uint8))) for picture in pictures]
+    return [
+        Image.fromarray(bytes_on_white(np.rint(255.0 * picture).astype(np.uint8))) for picture in pictures
+    ]

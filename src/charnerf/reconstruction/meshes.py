@@ -6,9 +6,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from charnerf.files import write_text
 from charnerf.inference.model import HEIGHT, TEXTURE_SIZE, Hero, TextureKind
 from charnerf.meshing.convergence import convergence_lines, measure_convergence
-from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh, write_aside
+from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh
 from charnerf.meshing.lod import Lod, lod_report, named
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.reconstruction.progress import BAR, meter
@@ -100,13 +101,13 @@ def write_meshes(hero: Hero, name: str, output: Path, request: MeshRequest) -> M
     if request.convergence:
         lines = [f"# {name}: level and cameras", "", *level_lines(first), ""]
         lines += convergence_lines(measure_convergence(hero.scene, hero.views, level=first.level))
-        write_aside(output / f"{name}_cameras.md", "\n".join(lines).encode())
+        write_text(output / f"{name}_cameras.md", "\n".join(lines))
         said += [line for line in lines if line]
     if request.is_single:
         return MeshFiles(paths, sheet, {}, tuple(said))
-    write_aside(output / "lods.md", lod_report(found).encode())
+    write_text(output / "lods.md", lod_report(found))
     rows = [{"file": file, **lod.row()} for file, lod in found.items()]
-    write_aside(output / "lods.json", (json.dumps(rows, indent=2) + "\n").encode())
+    write_text(output / "lods.json", json.dumps(rows, indent=2) + "\n")
     return MeshFiles(paths, sheet, found, tuple(said))
 
 

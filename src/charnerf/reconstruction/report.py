@@ -6,6 +6,7 @@ from pathlib import Path
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import curve_table, summary_lines
+from charnerf.markdown import table
 from charnerf.meshing.build import BuiltMesh
 
 ROWS_OF_LEVELS = 8
@@ -50,8 +51,8 @@ def report_text(
     if refined is not None:
         lines += ["", "## Refinement", "", *(f"- {one}" for one in summary_lines(refined)), ""]
         lines += ["![error against seconds](refinement.png)", "", *curve_table(refined)]
-    lines += ["", "## Seconds", "", "| stage | seconds |", "|---|---|"]
-    lines += [f"| {stage} | {value:.1f} |" for stage, value in seconds.items()]
+    lines += ["", "## Seconds", ""]
+    lines += table(("stage", "seconds"), [(stage, f"{value:.1f}") for stage, value in seconds.items()])
     lines += ["", f"Weights: {weights}", ""]
     return "\n".join(lines)
 
@@ -104,13 +105,12 @@ def level_lines(built: BuiltMesh) -> list[str]:
         return [f"The density {built.level:.3g} per metre was given, not chosen."]
     lines = ["The density was chosen so that the surface lies where rendering, seen from around, loses"]
     lines += ["half of its light. IoU: of the surface's silhouettes with the drawings.", ""]
-    lines += ["| density | distance, mm | IoU |", "|---|---|---|"]
+    rows = []
     tried = built.choice.tried
     step = max(1, len(tried) // ROWS_OF_LEVELS)
     for index, one in enumerate(tried):
         if index % step == 0 or one.level == built.level:
             mark = "**" if one.level == built.level else ""
-            lines.append(
-                f"| {mark}{one.level:.3g}{mark} | {1000 * one.depth_error:.1f} | {one.mask_iou:.3f} |"
-            )
-    return lines
+            cells = (f"{mark}{one.level:.3g}{mark}", f"{1000 * one.depth_error:.1f}", f"{one.mask_iou:.3f}")
+            rows.append(cells)
+    return [*lines, *table(("density", "distance, mm", "IoU"), rows)]

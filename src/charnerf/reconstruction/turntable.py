@@ -41,12 +41,6 @@ def render_around(
     return pictures
 
 
-def on_white(rgba: np.ndarray) -> np.ndarray:
-    """RGBA uint8 (H, W, 4) on white, RGB uint8."""
-    alpha = rgba[..., 3:].astype(np.float64) / 255.0
-    return np.rint(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha)).astype(np.uint8)
-
-
 def write_film(frames: Sequence[np.ndarray], folder: Path) -> tuple[Path, str | None]:
     """Write turntable.mp4, or turntable.gif where no ffmpeg is to be had.
 

@@ -12,6 +12,8 @@ from typing import Any
 
 from PIL import Image
 
+from charnerf.markdown import table
+
 _STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f23; background: #fff; max-width: 1320px;
@@ -125,9 +127,7 @@ def _(block: Code, folder: Path) -> str:
 
 @_markdown.register
 def _(block: Table, folder: Path) -> str:
-    rule = ["---"] + ["---:"] * (len(block.header) - 1)
-    lines = [block.header, rule, *block.rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return "\n".join(table(block.header, block.rows))
 
 
 @_markdown.register

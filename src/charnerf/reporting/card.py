@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from charnerf.data.layout import write_text_atomically
 from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.metrics_file import write_metrics
+from charnerf.files import write_text
+from charnerf.markdown import table
 from charnerf.reporting.parts import BASELINE_NAMES, COLUMNS, cell, metric_cells, read_metrics, seconds_text
 from charnerf.reporting.plots import Curve, plot_training, read_curve
 
@@ -49,7 +50,7 @@ def write_card(card: Path, curves: Sequence[Path], measured: Mapping[str, Path])
         files.append(copy)
         lines += ["", *_tables(title, metrics, copy.name)]
     start, end = text.index(BEGIN), text.index(END)
-    write_text_atomically(card, text[:start] + "\n".join([*lines, "", ""]) + text[end:])
+    write_text(card, text[:start] + "\n".join([*lines, "", ""]) + text[end:])
     return files
 
 
@@ -142,7 +143,7 @@ def _tables(title: str, metrics: Mapping[str, Any], file: str) -> list[str]:
         f" ([all figures]({file})). {seconds_text(seconds.get('encode'))} to encode a character, "
         f"{seconds_text(seconds.get('render_per_frame'))} a frame, {seconds_text(seconds.get('mesh'))} a mesh.",
         "",
-        *_markdown(["", *(name for name, _ in COLUMNS.values())], rows),
+        *table(["", *(name for name, _ in COLUMNS.values())], rows),
         "",
         *_azimuths(metrics),
     ]
@@ -157,8 +158,4 @@ def _azimuths(metrics: Mapping[str, Any]) -> list[str]:
         for key, what in (("psnr", "PSNR"), ("psnr_foreground", "foreground")):
             if found:
                 rows.append([f"{who}, {what}", *(cell(row.get(key), "{:.1f}") for row in found)])
-    return _markdown(["dB by azimuth", *(f"{row['azimuth_deg']}°" for row in bins)], rows)
-
-
-def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *rows)]
+    return table(["dB by azimuth", *(f"{row['azimuth_deg']}°" for row in bins)], rows)

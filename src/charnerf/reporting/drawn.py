@@ -21,7 +21,7 @@ from charnerf.errors import CharNeRFError, DataError
 from charnerf.inference import weights as runs
 from charnerf.inference.model import Model
 from charnerf.reporting.blocks import Block, Heading, Picture, Text
-from charnerf.reporting.pictures import CELL, from_floats, save_matrix
+from charnerf.reporting.pictures import CELL, picture_on_white, save_matrix
 from charnerf.reporting.rows import Row
 from charnerf.types import SourceViews
 
@@ -178,13 +178,12 @@ def _lines(
             given[size] = drawn_views(character, size)
         heroes.append(model.encode_views(given[size][0]))
     views, told = given[max(given)]
-    shown: list[Image.Image | None] = [
-        from_floats(image.permute(1, 2, 0).numpy()) for image in views.images[0]
-    ]
+    shown: list[Image.Image | None] = [picture_on_white(image.permute(1, 2, 0)) for image in views.images[0]]
     lines: list[tuple[str, list[Image.Image | None]]] = []
     for azimuth in SHOWN:
         pictures = [
-            from_floats(hero.render(azimuth_deg=azimuth, elevation_deg=10.0, size=CELL)) for hero in heroes
+            picture_on_white(hero.render(azimuth_deg=azimuth, elevation_deg=10.0, size=CELL))
+            for hero in heroes
         ]
         label = f"{character.name}\n{azimuth:.0f}°\n{'' if lines else told}"
         lines.append((label, [*([None] * len(shown) if lines else shown), *pictures]))

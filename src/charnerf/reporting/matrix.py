@@ -9,10 +9,9 @@ from PIL import Image
 from charnerf.data.characters import Character, load_character
 from charnerf.errors import DataError
 from charnerf.evaluation.angles import view_angles
-from charnerf.evaluation.pictures import to_bytes
 from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.characters import ranked
-from charnerf.reporting.pictures import on_white, open_on_white, save_matrix
+from charnerf.reporting.pictures import open_on_white, picture_on_white, save_matrix
 from charnerf.reporting.rows import Row, Run, data_root
 
 CHARACTERS = 4
@@ -49,7 +48,7 @@ def _lines(
 ) -> list[tuple[str, list[Image.Image | None]]]:
     """One line a view; the drawings stand in the first."""
     drawings: list[Image.Image | None] = [
-        on_white(Image.fromarray(to_bytes(image.movedim(0, -1)))) for image in character.sources.images[0]
+        picture_on_white(image.movedim(0, -1)) for image in character.sources.images[0]
     ]
     drawings += [None] * (views - len(drawings))
     empty: list[Image.Image | None] = [None] * views

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from charnerf.data.layout import write_text_atomically
 from charnerf.errors import DataError
 from charnerf.evaluation.scores import METRIC_KEYS
+from charnerf.files import write_text
 from charnerf.reporting.blocks import Block, Picture, Plot, Table, Text, plot_library, to_html, to_markdown
 
 COLUMNS = {
@@ -123,6 +123,6 @@ def write_report(folder: Path, title: str, blocks: Sequence[Block]) -> Path:
     """Write both forms, each in one step; plots stay still where plotly is not installed, which the report says."""
     if any(isinstance(block, Plot) for block in blocks) and plot_library() is None:
         blocks = [*blocks, Text(STILL)]
-    write_text_atomically(folder / "report.html", to_html(title, blocks))
-    write_text_atomically(folder / "report.md", to_markdown(blocks, folder))
+    write_text(folder / "report.html", to_html(title, blocks))
+    write_text(folder / "report.md", to_markdown(blocks, folder))
     return folder / "report.md"

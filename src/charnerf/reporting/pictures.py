@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
+from torch import Tensor
 
-from charnerf.evaluation.pictures import save_picture
+from charnerf.pictures import bytes_on_white, save_png, to_bytes
 
 CELL = 128  # pixels
 _INK = (60, 60, 60)
@@ -14,22 +15,15 @@ _HEADER, _LINE, _LABEL = 18, 14, 150
 _GAP = 6
 
 
-def on_white(picture: Image.Image) -> Image.Image:
-    """A picture with alpha on white, RGB."""
-    rgba = picture.convert("RGBA")
-    white = Image.new("RGBA", rgba.size, "white")
-    return Image.alpha_composite(white, rgba).convert("RGB")
-
-
 def open_on_white(path: Path) -> Image.Image:
     """A picture file on white, RGB."""
     with Image.open(path) as picture:
-        return on_white(picture)
+        return Image.fromarray(bytes_on_white(np.asarray(picture.convert("RGBA"))))
 
 
-def from_floats(rgba: np.ndarray) -> Image.Image:
-    """An array (H, W, 4) of floats in [0, 1] on white."""
-    return on_white(Image.fromarray((np.clip(rgba, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)))
+def picture_on_white(rgba: Tensor | np.ndarray) -> Image.Image:
+    """Straight-alpha pixels (H, W, 4) in [0, 1] on white, RGB."""
+    return Image.fromarray(bytes_on_white(to_bytes(rgba)))
 
 
 def save_matrix(
@@ -59,7 +53,7 @@ def save_matrix(
                 small = picture.width < CELL and CELL % picture.width == 0
                 how = Image.Resampling.NEAREST if small else Image.Resampling.LANCZOS
                 sheet.paste(picture.resize((CELL, CELL), how), (_LABEL + column * (CELL + _GAP), top))
-    save_picture(path, sheet)
+    save_png(path, sheet)
     return path
 
 

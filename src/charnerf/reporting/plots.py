@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from charnerf.errors import DataError
+from charnerf.files import write_aside
 from charnerf.reporting.interactive import PALETTE, Line
 
 _OURS, _HULL, _FOREGROUND, _GREY = "#1f5fa8", "#b8601a", "#3f8f5f", "#8a9099"
@@ -49,11 +50,9 @@ def _numbers(row: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG in one step."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.name}.part")
-    FigureCanvasAgg(figure).print_figure(aside, format="png", dpi=110)
-    aside.replace(path)
+    """Write a figure as PNG, whole or not at all."""
+    with write_aside(path) as aside:
+        FigureCanvasAgg(figure).print_figure(aside, format="png", dpi=110)
     return path
 
 

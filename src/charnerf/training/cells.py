@@ -18,6 +18,7 @@ from omegaconf import DictConfig
 
 from charnerf.config.grid import config_hash
 from charnerf.errors import DataError
+from charnerf.files import write_text
 from charnerf.training.run import run_training
 
 log = logging.getLogger(__name__)
@@ -152,9 +153,7 @@ def _train(cfg: DictConfig, folder: Path, train: Callable[[DictConfig, Path], No
 
 def _write(folder: Path, cell: Cell) -> None:
     content = {key: value for key, value in asdict(cell).items() if key != "name"}
-    aside = folder / f".{CELL_FILE}.{os.getpid()}.tmp"
-    aside.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    os.replace(aside, folder / CELL_FILE)
+    write_text(folder / CELL_FILE, json.dumps(content, indent=1))
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import os
 from pathlib import Path
 from typing import Any, final
 
@@ -13,7 +12,9 @@ from torch import Tensor
 from tqdm import tqdm
 
 from charnerf.data.validation import ValidationView
+from charnerf.files import write_text
 from charnerf.losses.total import TERMS
+from charnerf.pictures import on_white
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
 from charnerf.types import RenderOutput
@@ -103,9 +104,7 @@ class CurveWriter(L.Callback):
         writer = csv.DictWriter(text, fieldnames=CURVE_COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(self.rows)
-        aside = self.path.with_suffix(".partial")
-        aside.write_text(text.getvalue(), encoding="utf-8")
-        os.replace(aside, self.path)
+        write_text(self.path, text.getvalue())
 
     def state_dict(self) -> dict[str, Any]:
         """Rows so far, for a resumed run."""
@@ -141,16 +140,12 @@ class PictureLogger(L.Callback):
             output = pl_module.eval_renderer.render_camera(scene, batch.camera).finest
         opacity = output.opacity[..., None].expand_as(output.rgb)
         grey = _nearness(output)[..., None].expand_as(output.rgb)
-        pictures = [_on_white(batch.rgba), output.rgb, grey, opacity]
-        drawings = [_on_white(image.permute(1, 2, 0)) for image in batch.views.images[0]]
+        pictures = [on_white(batch.rgba), output.rgb, grey, opacity]
+        drawings = [on_white(image.permute(1, 2, 0)) for image in batch.views.images[0]]
         number = batch_idx // data
         step = trainer.global_step
         board.experiment.add_image(f"val/inputs/{number}", _row(drawings), step)
         board.experiment.add_image(f"val/truth_prediction_depth_opacity/{number}", _row(pictures), step)
-
-
-def _on_white(rgba: Tensor) -> Tensor:
-    return rgba[..., :3] * rgba[..., 3:] + (1.0 - rgba[..., 3:])
 
 
 def _nearness(output: RenderOutput) -> Tensor:

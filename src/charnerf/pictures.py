@@ -1,0 +1,40 @@
+"""Colours with alpha put on white, colours as bytes, and PNG files."""
+
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from charnerf.files import write_aside
+
+Array = TypeVar("Array", Tensor, np.ndarray)
+
+
+def on_white(rgba: Array) -> Array:
+    """Straight-alpha pixels (..., 4) in [0, 1] on white, (..., 3)."""
+    return rgba[..., :3] * rgba[..., 3:] + (1.0 - rgba[..., 3:])
+
+
+def images_on_white(images: Tensor) -> Tensor:
+    """The same with channels first: (..., 4, H, W) on white, (..., 3, H, W)."""
+    alpha = images[..., 3:, :, :]
+    return images[..., :3, :, :] * alpha + (1.0 - alpha)
+
+
+def bytes_on_white(rgba: np.ndarray) -> np.ndarray:
+    """Straight-alpha pixels (..., 4) uint8 on white, (..., 3) uint8."""
+    return to_bytes(on_white(rgba / 255.0))
+
+
+def to_bytes(values: Tensor | np.ndarray) -> np.ndarray:
+    """Numbers in [0, 1] as bytes of the same shape; what lies outside is clamped."""
+    return (torch.as_tensor(values).detach().clamp(0.0, 1.0) * 255.0).round().to(torch.uint8).cpu().numpy()
+
+
+def save_png(path: Path, picture: Image.Image) -> None:
+    """Write a PNG file, whole or not at all, with the folders that it needs."""
+    with write_aside(path) as aside:
+        picture.save(aside, format="PNG")

@@ -1,0 +1,40 @@
+"""A reader of a file sees all of the old one or all of the new one."""
+
+from pathlib import Path
+
+import pytest
+
+from charnerf.files import write_aside, write_bytes, write_text
+
+
+def test_the_old_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
+    file = tmp_path / "new" / "a.txt"
+    write_text(file, "old ä")
+    with write_aside(file) as aside:
+        aside.write_text("new")
+        assert aside.parent == file.parent
+        assert file.read_text(encoding="utf-8") == "old ä"
+    assert file.read_text() == "new"
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    file = tmp_path / "a.bin"
+    write_bytes(file, b"old")
+    with pytest.raises(RuntimeError), write_aside(file) as aside:
+        aside.write_bytes(b"half of the n")
+        raise RuntimeError
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_no_search_by_suffix_finds_what_is_being_written(tmp_path: Path) -> None:
+    with write_aside(tmp_path / "a.png") as aside:
+        aside.write_bytes(b"")
+        assert not list(tmp_path.glob("*.png"))
+
+
+def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
+    (tmp_path / "plain").write_text("")
+    write_text(tmp_path / "aside", "")
+    assert (tmp_path / "aside").stat().st_mode == (tmp_path / "plain").stat().st_mode
