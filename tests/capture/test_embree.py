@@ -182,7 +182,7 @@ def test_headlight_darkens_slants_only():
 
 def test_rays_meet_a_ball_where_the_formula_says():
     rng = np.random.default_rng(0)
-    caster = RayCaster(surface_of_scene(ball(subdivisions=6)))
+    caster = RayCaster.of_surface(surface_of_scene(ball(subdivisions=6)))
     origins = np.tile(np.array((0.0, -4.0, 1.0), np.float32), (2000, 1))
     directions = np.stack(
         (rng.uniform(-0.3, 0.3, 2000), np.ones(2000), rng.uniform(-0.3, 0.3, 2000)), axis=-1

@@ -9,10 +9,11 @@ from charnerf.data.augmentation import MirrorAndRecolor, StretchAndRecolor, mirr
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import BatchRequest
 from charnerf.data.store import CharacterStore
-from charnerf.data.surface import AreaSurface, load_surface_mesh
+from charnerf.data.surface import AreaSurface
 from charnerf.geometry.cameras import project_into_all
 from charnerf.geometry.hull import build_hull, hull_contains
 from charnerf.models.views.mirrored import MirroredSide
+from charnerf.surfaces.mesh_files import load_surface_mesh
 
 LOW = torch.tensor((-1.8, -1.8, -0.8))
 VIEWS = MirroredSide()

@@ -14,12 +14,13 @@ from charnerf.data.augmentation import NoAugmentation
 from charnerf.data.mixed import MixedDataset, stack_views
 from charnerf.data.sampler import BatchRequest
 from charnerf.data.store import CharacterStore
-from charnerf.data.surface import AreaSurface, load_surface_mesh
+from charnerf.data.surface import AreaSurface
 from charnerf.data.validation import ValidationDataset, spread_frames
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
 from charnerf.geometry.hull import build_hull, occupied_edges
 from charnerf.models.views.turnaround import Turnaround
+from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.types import SourceViews, TrainBatch
 from support import helpers
 

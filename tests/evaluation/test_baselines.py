@@ -3,9 +3,9 @@ import torch
 
 from charnerf.evaluation import metrics
 from charnerf.evaluation.baselines import VisualHullBaseline, signed_edge_distances, white_prediction
-from charnerf.evaluation.ray_mesh import RayMesh
 from charnerf.evaluation.surface_error import seen_points, surface_scores
 from charnerf.pictures import on_white
+from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import SourceViews
 from support.figures import SIZE, figure, photograph, source_views, target_cameras
 
@@ -55,7 +55,7 @@ def test_hull_holds_the_object(case):
     inside = torch.from_numpy(mesh.sample(400, seed=0)).float()
     inside = inside + (torch.tensor([0.0, 0.0, 1.0]) - inside) * 0.05  # a little towards the middle
     up = torch.tensor([0.0, 0.0, 1.0]).expand(len(inside), 3)
-    from_below = RayMesh(hull.mesh.vertices, hull.mesh.faces).occluded(inside.numpy(), up.numpy())
+    from_below = RayCaster(hull.mesh.triangles).occluded(inside.numpy(), up.numpy())
     assert from_below.mean() > 0.97
 
 

@@ -10,7 +10,7 @@ import torch
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.outlines import ABOVE, gain_at, raised_rays
-from charnerf.meshing.picture import render_mesh
+from charnerf.surfaces.render import render_mesh
 from charnerf.types import FieldOutput, Scene, SourceViews
 from support import helpers
 from support.analytic_scenes import capsule, figure, scene_of

@@ -123,7 +123,7 @@ def test_fronts_are_unlike_backs(characters):
     x, z = np.meshgrid(np.linspace(-0.6, 0.6, 24), np.linspace(0.05, 1.95, 32))
     for seed in SEEDS[:8]:
         surface = surface_of_scene(assemble(characters[seed]))
-        caster = RayCaster(surface)
+        caster = RayCaster.of_surface(surface)
         colours = []
         for side in (-1.0, 1.0):
             origins = np.stack((x.ravel(), np.full(x.size, 4.0 * side), z.ravel()), axis=-1)

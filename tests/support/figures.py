@@ -11,14 +11,13 @@ import trimesh
 from charnerf.data.characters import CharacterPictures, write_character
 from charnerf.data.layout import add_to_split
 from charnerf.evaluation.baselines import VisualHullBaseline
-from charnerf.evaluation.ray_mesh import RayMesh
 from charnerf.geometry.cameras import (
     cameras_towards,
     direction_from_angles,
     fibonacci_hemisphere,
     pixel_centres,
-    pixel_rays,
 )
+from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import Cameras, LeftOut, RenderOutput, SourceViews
 
 SIZE = 48
@@ -45,14 +44,10 @@ def colours_at(points: np.ndarray) -> torch.Tensor:
 
 def photograph(mesh: trimesh.Trimesh, camera: Cameras, *, oversampling: int = 4) -> torch.Tensor:
     """Antialiased RGBA bytes (H, W, 4) of a figure."""
-    rays = pixel_rays(
-        camera, pixel_centres(camera.width * oversampling, camera.height * oversampling) / oversampling
-    )
-    hits = RayMesh(mesh.vertices, mesh.faces).first_hits(
-        rays.origins.reshape(-1, 3).numpy(), rays.directions.reshape(-1, 3).numpy()
-    )
+    pixels = pixel_centres(camera.width * oversampling, camera.height * oversampling) / oversampling
+    hits = RayCaster(mesh.triangles).pixel_hits(camera, pixels.reshape(-1, 2))
     fine = torch.zeros(camera.width * camera.height * oversampling**2, 4)
-    fine[hits.rays] = torch.cat((colours_at(hits.points), torch.ones(len(hits.rays), 1)), dim=1)
+    fine[hits.hit, :3], fine[hits.hit, 3] = colours_at(hits[hits.hit].points), 1.0
     mean = fine.reshape(camera.height, oversampling, camera.width, oversampling, 4).mean(dim=(1, 3))
     mean[..., :3] /= mean[..., 3:].clamp_min(1e-6)
     return (mean * 255.0).round().to(torch.uint8)

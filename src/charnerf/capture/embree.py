@@ -17,7 +17,6 @@ from charnerf.geometry.cameras import (
     cameras_towards,
     direction_from_angles,
     fibonacci_hemisphere,
-    pixel_rays,
     project,
 )
 from charnerf.surfaces.color import srgb_from_linear
@@ -158,7 +157,7 @@ class _Studio:
     def __init__(self, surface: SurfaceMesh, options: CaptureOptions):
         self._surface = surface
         self._options = options
-        self._caster = RayCaster(surface)
+        self._caster = RayCaster.of_surface(surface)
         self._normals = triangle_normals(surface)
         self._levels: dict[float, np.ndarray] = {}
         self._outline: dict[float, torch.Tensor] = {}
@@ -174,12 +173,11 @@ class _Studio:
         seen, depth = np.zeros((height, width), dtype=bool), np.zeros((height, width), np.uint16)
         near_edges = self._edge_pixels(camera)
         rows, columns = np.nonzero(_filled_box(near_edges))
-        hits, directions = self._trace(camera, np.stack((columns, rows), axis=-1) + 0.5)
-        hit = hits.triangles >= 0
-        seen[rows[hit], columns[hit]] = True
-        axis = -camera.world_from_camera[:3, 2].numpy()
-        along = hits.distances[hit] * (directions[hit] @ axis)
-        depth[rows[hit], columns[hit]] = np.clip(np.rint(1000.0 * along), 1, 65535).astype(np.uint16)
+        rays = self._trace(camera, np.stack((columns, rows), axis=-1) + 0.5)
+        hits, rows, columns = rays[rays.hit], rows[rays.hit], columns[rays.hit]
+        seen[rows, columns] = True
+        along = hits.distances * (hits.directions @ -camera.world_from_camera[:3, 2].numpy())
+        depth[rows, columns] = np.clip(np.rint(1000.0 * along), 1, 65535).astype(np.uint16)
 
         rows, columns = np.nonzero(seen | near_edges)
         linear = self._supersample(camera, rows, columns, self._options.subsamples)
@@ -191,22 +189,19 @@ class _Studio:
         rgba[rows, columns] = _encode(linear)
         return _Shot(rgba=rgba, depth=depth)
 
-    def _trace(self, camera: Cameras, pixels: np.ndarray) -> tuple[Hits, np.ndarray]:
-        """Hits of rays through pixel positions (R, 2), and the rays' directions (R, 3)."""
-        rays = pixel_rays(camera, torch.from_numpy(pixels.astype(np.float32)))
-        directions = rays.directions.numpy()
-        return self._caster.first_hits(rays.origins.numpy(), directions), directions
+    def _trace(self, camera: Cameras, pixels: np.ndarray) -> Hits:
+        """Hits of rays through pixel positions (R, 2)."""
+        return self._caster.pixel_hits(camera, torch.from_numpy(pixels.astype(np.float32)))
 
     def _supersample(self, camera: Cameras, rows: np.ndarray, columns: np.ndarray, count: int) -> np.ndarray:
         """Linear RGBA (K, 4) of pixels (K,): mean colour of what is hit, alpha the share that is hit."""
         pixels = np.stack((columns, rows), axis=-1)[:, None] + _lattice(count)
-        hits, directions = self._trace(camera, pixels.reshape(-1, 2))
-        hit = np.flatnonzero(hits.triangles >= 0)
-        triangles = hits.triangles[hit]
+        rays = self._trace(camera, pixels.reshape(-1, 2))
+        hits = rays[rays.hit]
         levels = self._texture_levels(_pixel_size(camera) / math.sqrt(count))
-        colors = shade(self._surface, triangles, hits.u[hit], hits.v[hit], levels)[:, :3]
-        colors = self._options.light.lit(colors, self._normals[triangles], directions[hit])
-        number, owner = len(rows), hit // count
+        colors = shade(self._surface, hits.triangles, hits.u, hits.v, levels)[:, :3]
+        colors = self._options.light.lit(colors, self._normals[hits.triangles], hits.directions)
+        number, owner = len(rows), np.flatnonzero(rays.hit) // count
         total = np.bincount(owner, minlength=number)
         sums = [np.bincount(owner, weights=channel, minlength=number) for channel in colors.T]
         rgb = np.stack(sums, axis=-1) / np.maximum(total, 1)[:, None]

@@ -15,8 +15,6 @@ from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, shade, triangle_areas
 from charnerf.types import Cameras, SurfacePoints
 
-__all__ = ["AbstractSurface", "AreaSurface", "VisibleSurface", "load_surface_mesh", "visible_surface_points"]
-
 _MAX_ROUNDS = 50
 
 

@@ -34,7 +34,7 @@ def see_points(mesh: SurfaceMesh, points: np.ndarray, triangles: np.ndarray, cam
         triangles: Their triangles, (K,).
         cameras: (N,).
     """
-    caster = RayCaster(mesh)
+    caster = RayCaster.of_surface(mesh)
     normals = triangle_normals(mesh)[triangles]
     visible = np.zeros(len(points), dtype=bool)
     hidden = np.arange(len(points))
@@ -42,9 +42,10 @@ def see_points(mesh: SurfaceMesh, points: np.ndarray, triangles: np.ndarray, cam
         if len(hidden) == 0:
             break
         origins, directions, distances = _rays_to(cameras[index], points[hidden])
-        hits = caster.first_hits(origins, directions)
+        seen = caster.reaches(
+            origins, directions, triangles=triangles[hidden], distances=distances, tolerance=_TOLERANCE
+        )
         cosines = (normals[hidden] * directions).sum(axis=-1)
-        seen = (hits.triangles == triangles[hidden]) | (hits.distances > distances - _TOLERANCE)
         seen &= np.abs(cosines) > _MIN_COSINE
         normals[hidden[seen & (cosines > 0.0)]] *= -1.0
         visible[hidden[seen]] = True

@@ -15,9 +15,9 @@ from charnerf.evaluation.baselines import VisualHullBaseline
 from charnerf.evaluation.surface_error import surface_scores, true_points
 from charnerf.markdown import table
 from charnerf.meshing.build import find_surface, finish_mesh
-from charnerf.meshing.picture import render_mesh
 from charnerf.meshing.texture import Texturing
 from charnerf.pictures import on_white
+from charnerf.surfaces.render import render_mesh
 from charnerf.types import Cameras, Scene
 
 KINDS = ("drawings", "field", "vertex")

@@ -9,9 +9,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from charnerf.evaluation.ray_mesh import RayMesh
-from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
+from charnerf.geometry.cameras import pixel_centres, project
 from charnerf.geometry.safe import safe_normalize
+from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import Cameras, RenderOutput
 
 FAR = 10.0
@@ -45,7 +45,7 @@ class ProjectedMesh:
 
     def __init__(self, triangles: np.ndarray, cameras: Cameras, premultiplied: Tensor) -> None:
         corners = np.asarray(triangles, dtype=np.float32)
-        self._rays = RayMesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        self._caster = RayCaster(corners)
         sides = torch.from_numpy(corners[:, 1:] - corners[:, :1])
         self._normals = safe_normalize(torch.linalg.cross(sides[:, 0], sides[:, 1])).numpy()
         self._cameras = cameras
@@ -54,18 +54,17 @@ class ProjectedMesh:
     def render(self, camera: Cameras) -> RenderOutput:
         """Picture of a camera of shape (): fields (H, W), on white."""
         width, height, many = camera.width, camera.height, _OVERSAMPLING
-        rays = pixel_rays(camera.to("cpu", torch.float32), pixel_centres(width * many, height * many) / many)
-        origins, directions = (tensor.reshape(-1, 3).numpy() for tensor in (rays.origins, rays.directions))
-        hits = self._rays.first_hits(origins, directions)
+        pixels = (pixel_centres(width * many, height * many) / many).reshape(-1, 2)
+        rays = self._caster.pixel_hits(camera, pixels)
+        hits = rays[rays.hit]
         towards = camera.world_from_camera[:3, 2].to("cpu", torch.float32)
         normals = self._normals[hits.triangles]
-        away = (normals * directions[hits.rays]).sum(-1, keepdims=True) > 0.0
+        away = (normals * hits.directions).sum(-1, keepdims=True) > 0.0
         normals = np.where(away, -normals, normals)  # of the side that is seen
         colours = self._colours(torch.from_numpy(hits.points), torch.from_numpy(normals), towards)
-        fine = torch.zeros(len(origins), 5)
-        index = torch.from_numpy(hits.rays)
-        fine[index] = torch.cat(
-            (colours, torch.ones(len(index), 1), torch.from_numpy(hits.distances)[:, None]), dim=1
+        fine = torch.zeros(len(pixels), 5)
+        fine[torch.from_numpy(rays.hit)] = torch.cat(
+            (colours, torch.ones(len(colours), 1), torch.from_numpy(hits.distances)[:, None]), dim=1
         )
         mean = fine.reshape(height, many, width, many, 5).mean(dim=(1, 3))
         opacity = mean[..., 3]
@@ -101,7 +100,7 @@ class ProjectedMesh:
             facing = (normals * to_source).sum(-1)
             seen = facing > _MIN_FACING
             starts = points[seen] + _RAY_OFFSET * normals[seen]
-            free = ~self._rays.occluded(starts.numpy(), to_source[seen].numpy())
+            free = ~self._caster.occluded(starts.numpy(), to_source[seen].numpy())
             seen[seen.clone()] = torch.from_numpy(free)
             scores.append(torch.where(seen, 10.0 + axis @ towards, facing.abs()))
         return torch.stack(scores).argmax(dim=0)

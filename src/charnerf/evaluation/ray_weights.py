@@ -16,7 +16,6 @@ from torch import Tensor
 
 from charnerf.data.characters import Character
 from charnerf.data.layout import read_json
-from charnerf.data.surface import load_surface_mesh
 from charnerf.errors import DataError
 from charnerf.evaluation.evaluate import fixed_views
 from charnerf.files import write_text
@@ -25,6 +24,7 @@ from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import stratified_t_vals
 from charnerf.models.charnerf import CharNeRF
+from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import RayBundle, Scene
 from charnerf.volume.compositing import expected_depth, weights_from_densities
@@ -185,7 +185,7 @@ def _character(
     """Rays of a character's cameras at which both are opaque."""
     device = network.box[0].device
     assert character.mesh_file is not None
-    caster = RayCaster(load_surface_mesh(character.mesh_file))
+    caster = RayCaster.of_surface(load_surface_mesh(character.mesh_file))
     scene = network.scene(network.encode(character.sources.to(device)), 0)
     parts = []
     for index in fixed_views(character, views):

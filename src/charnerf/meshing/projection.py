@@ -23,7 +23,6 @@ from torch import Tensor
 
 from charnerf.geometry.cameras import directions_to_points, pixel_centres, pixel_rays, project
 from charnerf.surfaces.raycast import RayCaster
-from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.types import Cameras, SourceViews
 
 OPAQUE = 0.9  # alpha from which a pixel is the figure's alone
@@ -68,8 +67,7 @@ class Projector:
         used = (views.present & ~views.mirrored)[0]
         self._cameras: Cameras = views.cameras[0][used].to("cpu", torch.float32)
         images = views.images[0][used].to("cpu", torch.float32).movedim(1, -1).numpy()
-        bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-        self._caster = RayCaster(surface_of_scene(bare))
+        self._caster = RayCaster(mesh.triangles)
         pairs = [(self._cameras[v], images[v]) for v in range(len(images))]
         self._bands = [_bands(image, _pixels_a_metre(camera)) for camera, image in pairs]
         self._occluders = [self._occluder_depth(camera) for camera, _ in pairs]
@@ -120,23 +118,20 @@ class Projector:
         """Whether the ray through each pixel position meets its point (K, 3) first, (K,) bool."""
         rays = pixel_rays(camera, pixels)
         origins, directions = rays.origins.numpy(), rays.directions.numpy()
-        hits = self._caster.first_hits(origins, directions)
         distances = ((points - origins) * directions).sum(1)
-        return (hits.triangles == face) | (hits.distances > distances - IN_FRONT)
+        return self._caster.reaches(
+            origins, directions, triangles=face, distances=distances, tolerance=IN_FRONT
+        )
 
     def _occluder_depth(self, camera: Cameras) -> np.ndarray:
         """Least depth of the mesh within BESIDE of each place of the picture, m; infinite where nothing is."""
         share = min(1.0, DEPTH_SIZE / max(camera.width, camera.height))
         width, height = round(camera.width * share), round(camera.height * share)
         scale = torch.tensor((camera.width / width, camera.height / height))
-        rays = pixel_rays(camera, pixel_centres(width, height).reshape(-1, 2) * scale)
-        origins, directions = rays.origins.numpy(), rays.directions.numpy()
-        hits = self._caster.first_hits(origins, directions)
+        hits = self._caster.pixel_hits(camera, pixel_centres(width, height).reshape(-1, 2) * scale)
         axis = -camera.world_from_camera[:3, 2].numpy()
         centre = camera.world_from_camera[:3, 3].numpy()
-        to_origin = (origins - centre) @ axis
-        missed = hits.triangles < 0
-        depth = to_origin + np.where(missed, np.inf, hits.distances) * (directions @ axis)
+        depth = (hits.origins - centre) @ axis + hits.distances * (hits.directions @ axis)
         reach = max(1, round(BESIDE * _pixels_a_metre(camera) * share))
         return ndimage.minimum_filter(depth.reshape(height, width), size=2 * reach + 1, mode="nearest")
 

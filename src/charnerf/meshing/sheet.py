@@ -6,8 +6,8 @@ import trimesh
 from PIL import Image, ImageDraw, ImageFont
 
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
-from charnerf.meshing.picture import render_clay, render_mesh
 from charnerf.pictures import on_white, to_bytes
+from charnerf.surfaces.render import render_clay, render_mesh
 from charnerf.types import Cameras, SourceViews
 
 SIDES = 8

@@ -20,12 +20,13 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import PhaseSampler
 from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
-from charnerf.data.surface import AbstractSurface, load_surface_mesh
+from charnerf.data.surface import AbstractSurface
 from charnerf.errors import ConfigError
 from charnerf.inference.weights import build_model, build_part, build_renderer, save_config, save_weights
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.matrix_products import use_fastest_products
+from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.training.averaging import WeightAverage
 from charnerf.training.clock import RunClock
 from charnerf.training.finish import finish_run

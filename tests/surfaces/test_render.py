@@ -6,8 +6,8 @@ import trimesh
 from PIL import Image
 
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
-from charnerf.meshing.picture import render_clay, render_mesh
 from charnerf.meshing.sheet import around, contact_sheet
+from charnerf.surfaces.render import render_clay, render_mesh
 from charnerf.types import SourceViews
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import torch
 import trimesh
 
-from charnerf.geometry.cameras import pixel_centres, pixel_rays
+from charnerf.geometry.cameras import pixel_centres
 from charnerf.surfaces.color import srgb_from_linear
 from charnerf.surfaces.raycast import Hits, RayCaster
 from charnerf.surfaces.scene_mesh import COLORS_KEY, surface_of_scene
-from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, shade
+from charnerf.surfaces.surface_mesh import interpolate, shade
 from charnerf.types import Cameras
 
 OVERSAMPLING = 3  # rays a pixel, along each side
@@ -33,43 +32,34 @@ def render_mesh(mesh: trimesh.Trimesh, cameras: Cameras) -> np.ndarray:
     named.metadata[COLORS_KEY] = "srgb"
     surface = surface_of_scene(named)
 
-    def colours(hits: Hits, hit: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        return shade(surface, hits.triangles[hit], hits.u[hit], hits.v[hit])[:, :3]
+    def colors(hits: Hits) -> np.ndarray:
+        return shade(surface, hits.triangles, hits.u, hits.v)[:, :3]
 
-    return _photographs(surface, cameras, colours)
+    return _pictures(RayCaster.of_surface(surface), cameras, colors)
 
 
 def render_clay(mesh: trimesh.Trimesh, cameras: Cameras) -> np.ndarray:
     """The shape alone, lit from the camera, smooth normals; arguments and result as of `render_mesh`."""
     corners = np.asarray(mesh.vertex_normals)[np.asarray(mesh.faces)]
 
-    def colours(hits: Hits, hit: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        normals = interpolate(corners[hits.triangles[hit]], hits.u[hit], hits.v[hit])
+    def colors(hits: Hits) -> np.ndarray:
+        normals = interpolate(corners[hits.triangles], hits.u, hits.v)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        facing = np.maximum(-(normals * directions[hit]).sum(1), 0.0)
+        facing = np.maximum(-(normals * hits.directions).sum(1), 0.0)
         return np.repeat(CLAY * (0.1 + 0.9 * facing[:, None]), 3, axis=1)
 
-    bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    return _photographs(surface_of_scene(bare), cameras, colours)
+    return _pictures(RayCaster(mesh.triangles), cameras, colors)
 
 
-def _photographs(
-    surface: SurfaceMesh,
-    cameras: Cameras,
-    colours: Callable[[Hits, np.ndarray, np.ndarray], np.ndarray],
-) -> np.ndarray:
-    """Pictures of a surface; the function gives linear RGB of hits by (hits, which, directions)."""
-    caster = RayCaster(surface)
+def _pictures(caster: RayCaster, cameras: Cameras, colors: Callable[[Hits], np.ndarray]) -> np.ndarray:
+    """Pictures of what rays hit, in the linear RGB (K, 3) that a function gives of hits (K,)."""
     width, height, many = cameras.width, cameras.height, OVERSAMPLING
     pixels = (pixel_centres(width * many, height * many) / many).reshape(-1, 2)
     pictures = []
     for index in range(len(cameras.orthographic)):
-        rays = pixel_rays(cameras[index].to("cpu", torch.float32), pixels)
-        directions = rays.directions.numpy()
-        hits = caster.first_hits(rays.origins.numpy(), directions)
-        hit = np.flatnonzero(hits.triangles >= 0)
+        hits = caster.pixel_hits(cameras[index], pixels)
         linear = np.zeros((len(pixels), 4), np.float32)
-        linear[hit, :3], linear[hit, 3] = colours(hits, hit, directions), 1.0
+        linear[hits.hit, :3], linear[hits.hit, 3] = colors(hits[hits.hit]), 1.0
         mean = linear.reshape(height, many, width, many, 4).mean(axis=(1, 3))
         rgb = srgb_from_linear(mean[..., :3] / np.maximum(mean[..., 3:], 1e-6))
         pictures.append(np.concatenate((rgb, mean[..., 3:]), axis=-1).astype(np.float32))
