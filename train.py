@@ -16,6 +16,7 @@ from charnerf.config import validate
 from charnerf.config.composition import run_door, trusted_by
 from charnerf.config.grid import grid_command
 from charnerf.errors import GridError
+from charnerf.process import keep_freed_memory, limit_spinning, use_fastest_products
 
 
 @hydra.main(version_base="1.3", config_path="conf", config_name="train")
@@ -24,6 +25,8 @@ def train(cfg: DictConfig) -> None:
     from charnerf.training.cells import run_cell
     from charnerf.training.run import run_training
 
+    keep_freed_memory()  # here, since a launcher may run the job in a process of its own
+    use_fastest_products()
     job = HydraConfig.get()
     validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
     folder = Path(job.runtime.output_dir)
@@ -58,4 +61,5 @@ def train_all() -> None:
 
 
 if __name__ == "__main__":
+    limit_spinning()
     sys.exit(run_door(train_all, arguments=sys.argv[1:], conf=Path(__file__).resolve().parent / "conf"))

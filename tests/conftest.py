@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from charnerf.process import use_fastest_products
 from charnerf.types import SourceViews
 from support import helpers
 
@@ -20,6 +21,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for marker, variable in OPT_IN.items():
             if marker in item.keywords and marker not in asked and os.environ.get(variable) != "1":
                 item.add_marker(pytest.mark.skip(reason=f"opt in by -m {marker} or {variable}=1"))
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _products_of_doors() -> None:
+    """As doors set them: the numbers must not depend on whether a test that runs a command came before."""
+    use_fastest_products()
 
 
 @pytest.fixture(autouse=True)

@@ -15,6 +15,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("errors",),
     ("types", "checks", "schedule", "files", "markdown"),
     ("pictures",),
+    ("process",),
     ("geometry",),
     ("config", "losses", "models", "surfaces", "volume"),
     ("data", "meshing", "procedural"),
@@ -44,13 +45,16 @@ ONLY_IN = {  # foreign package: where it may be imported
     "lightning": ("training", "data/datamodule"),
     "typer": ("cli",),
 }
+DOORS = {"cli", "commands"}  # and train.py: they alone change settings of the process
 
 GLOBAL_SETTERS = {
     "seed",
     "manual_seed",
     "seed_everything",
     "set_num_threads",
+    "set_float32_matmul_precision",
     "set_default_dtype",
+    "setdefault",
     "use",
     "mallopt",
 }
@@ -106,6 +110,13 @@ def test_frameworks_stay_in_their_rooms(file: Path) -> None:
         if places is not None:
             fine = any(module == place or module.startswith(f"{place}/") for place in places)
             assert fine, f"{file}:{line}: imports {name}, which belongs to {', '.join(places)}"
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_settings_of_the_process_belong_to_doors(file: Path) -> None:
+    if room_of(file) not in DOORS:
+        for line, name in imports_of(file):
+            assert not name.startswith("charnerf.process"), f"{file}:{line}: only doors set the process"
 
 
 def test_no_drawer_for_leftovers() -> None:

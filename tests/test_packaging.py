@@ -1,6 +1,5 @@
 """What an installed package carries."""
 
-import os
 import subprocess
 import sys
 import tomllib
@@ -23,17 +22,6 @@ def test_every_public_name_is_there_and_imported_late() -> None:
     with pytest.raises(AttributeError, match="nothing"):
         charnerf.nothing  # noqa: B018
     assert set(charnerf.__all__) <= set(dir(charnerf))
-
-
-def test_threads_do_not_spin_for_long_unless_asked_to() -> None:
-    """What OpenMP reads when torch is loaded; what the user has set stays."""
-    code = "import os, charnerf; print(os.environ['GOMP_SPINCOUNT'])"
-    for given, expected in (({}, "100000"), ({"GOMP_SPINCOUNT": "7"}, "7")):
-        environment = {name: value for name, value in os.environ.items() if name != "GOMP_SPINCOUNT"} | given
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
-        )
-        assert done.stdout.strip() == expected
 
 
 def test_the_version_is_the_projects() -> None:

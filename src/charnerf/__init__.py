@@ -10,7 +10,6 @@ The names below are imported when they are first used, so that `import charnerf`
 """
 
 import importlib
-import os
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -38,10 +37,6 @@ if TYPE_CHECKING:
     from charnerf.inference.weights import load as load
     from charnerf.inference.weights import save_weights as save_weights
     from charnerf.meshing.export import save_mesh as save_mesh
-
-# Before torch starts its threads: on busy cores threads that spin for one another take the time that those waited for need.
-# A hundred thousand turns: fewer cost time on idle cores, see docs/speed.md.
-os.environ.setdefault("GOMP_SPINCOUNT", "100000")
 
 try:
     __version__ = version("charnerf")

@@ -26,6 +26,7 @@ from charnerf.inference import weights as runs
 from charnerf.inference.model import Model, TextureKind
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.lod import lod_table
+from charnerf.process import use_fastest_products
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
 from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.reporting.report import report as write_report
@@ -53,6 +54,7 @@ def say(text: str) -> None:
 
 def load_model(path: Path | None, *, device: str, trust: Sequence[str], renderer: str | None = None) -> Model:
     """Load a model onto a device, with its own renderer or another one of the same settings."""
+    use_fastest_products()
     model = runs.load(path, trusted_targets=trust).to(pick_device(device))
     if model.note is not None:
         say(f"{model.source}: {model.note}")

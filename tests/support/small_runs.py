@@ -11,7 +11,6 @@ from omegaconf import DictConfig
 from charnerf.config.composition import compose_config
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.inference.weights import build_model, build_part, build_renderer
-from charnerf.models.matrix_products import use_fastest_products
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
 from charnerf.training.run import build_data, build_trainer, surface_delta, training_renderer
@@ -64,7 +63,6 @@ class SmallRun:
 
 def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> SmallRun:
     """Everything that `run_training` builds before it trains."""
-    use_fastest_products()  # also where another test of the process has asked for it: the same numbers in every process
     L.seed_everything(cfg.seed, verbose=False)
     folder.mkdir(parents=True, exist_ok=True)
     model = build_model(cfg)

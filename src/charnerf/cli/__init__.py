@@ -28,6 +28,7 @@ from charnerf.cli.options import (
     Weights,
 )
 from charnerf.errors import CharNeRFError, ConfigError
+from charnerf.process import limit_spinning
 
 FAILED, WRONG_CALL = 1, 2
 DEBUG_NOTE = "Exit status: 0 done, 1 failed, 2 wrong call. --debug shows the traceback of an error."
@@ -345,6 +346,7 @@ def bench(
 
 def main() -> None:
     """Run a command and leave with its exit status."""
+    limit_spinning()
     sys.exit(run(sys.argv[1:]))
 
 

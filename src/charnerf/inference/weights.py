@@ -22,7 +22,6 @@ from charnerf.files import write_aside, write_text
 from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.field import Field
-from charnerf.models.matrix_products import use_fastest_products
 from charnerf.volume.renderers.base import AbstractRenderer
 
 IMAGE_CHANNELS = 4  # RGBA
@@ -93,7 +92,7 @@ def build_renderer(cfg: DictConfig) -> AbstractRenderer:
 
 
 def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ()) -> Model:
-    """Load a trained model in eval mode; float32 products then run as `use_fastest_products` says.
+    """Load a trained model in eval mode.
 
     Args:
         path: A run folder, a .ckpt below one, a .safetensors; the released weights if None.
@@ -120,8 +119,8 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
         validate_model(cfg, trusted_targets=trusted_targets)
     except ConfigError as error:
         raise ConfigError(f"{file}: its config can not be used. {error}") from error
-    use_fastest_products()
-    network = build_model(cfg)
+    with torch.random.fork_rng(devices=[]):  # first weights are drawn, to be overwritten
+        network = build_model(cfg)
     try:
         network.load_state_dict(state, strict=True)
     except RuntimeError as error:

@@ -1,6 +1,5 @@
 """One run from a validated config: prepare data, train, evaluate the test split, mesh, report."""
 
-import ctypes
 import logging
 import warnings
 from collections.abc import Callable
@@ -25,7 +24,6 @@ from charnerf.errors import ConfigError
 from charnerf.inference.weights import build_model, build_part, build_renderer, save_config, save_weights
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
-from charnerf.models.matrix_products import use_fastest_products
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.training.averaging import WeightAverage
 from charnerf.training.clock import RunClock
@@ -50,8 +48,6 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         cfg: Composed and validated.
         folder: The run folder (design: On disk); made if it is missing.
     """
-    keep_freed_memory()
-    use_fastest_products()
     logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)  # the bar and the report say the rest
     L.seed_everything(cfg.seed, verbose=False)
     folder.mkdir(parents=True, exist_ok=True)
@@ -287,18 +283,3 @@ def _flat(node: Any, key: str = "") -> dict[str, bool | int | float | str]:
     for name, value in items:
         flat |= _flat(value, f"{key}.{name}" if key else str(name))
     return flat
-
-
-def keep_freed_memory() -> None:
-    """Let glibc keep freed memory: a training step frees and takes the same blocks again (measured: see docs).
-
-    Does nothing where the C library is another one.
-    """
-    try:
-        library = ctypes.CDLL("libc.so.6")
-    except OSError:
-        return
-    trim_threshold, top_pad, mmap_max = -1, -2, -4
-    library.mallopt(mmap_max, 0)
-    library.mallopt(trim_threshold, 1 << 30)
-    library.mallopt(top_pad, 1 << 26)
