@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import torch
 from omegaconf import OmegaConf
@@ -21,6 +21,7 @@ from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
 from charnerf.evaluation.evaluate import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
+from charnerf.files import write_text
 from charnerf.geometry.resizing import resized_cameras
 from charnerf.inference import weights as runs
 from charnerf.inference.model import Model, TextureKind
@@ -32,9 +33,6 @@ from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.reporting.report import report as write_report
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
-
-if TYPE_CHECKING:
-    from charnerf.bench.run import Request
 
 LIGHTS = {"unlit": Unlit, "headlight": Headlight}
 RENDERERS = {
@@ -321,21 +319,23 @@ def report(folder: Path, *, drawings: Path | None, trust: Sequence[str]) -> None
 
 def bench(
     weights: Path | None,
-    request: "Request",
-    *,
-    roofline: bool,
+    data: Path | None,
+    split: str,
+    quick: bool,
     json_file: Path | None,
+    output: Path,
+    *,
     device: str,
     trust: Sequence[str],
 ) -> None:
     """Measure error against run time."""
-    from charnerf.bench import run as benchmark
+    from charnerf.bench.run import run, summary
 
     model = load_model(weights, device=device, trust=trust)
-    result = (benchmark.run_roofline if roofline else benchmark.run)(model, request, say)
+    result = run(model, data=data, split=split, quick=quick, output=output, say=say)
     if json_file is not None:
-        benchmark.write_json(json_file, result)
-    sys.stdout.write(benchmark.summary(result) + "\n")
+        write_text(json_file, json.dumps(result, indent=2) + "\n")
+    sys.stdout.write(summary(result) + "\n")
 
 
 CHECKED_SIZE = 48  # pixels: each one is a ray of its own

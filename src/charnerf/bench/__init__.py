@@ -1,1 +1,1 @@
-"""Error against run time: the baseline, the methods, their references, sweeps, tables, plots."""
+"""Error against run time: one model rendered by every renderer, beside the same network evaluated as pixelNeRF's authors do."""

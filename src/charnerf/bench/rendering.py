@@ -11,12 +11,12 @@ import torch
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelNeRFLike
-from charnerf.bench.measure import Timing, in_turns
 from charnerf.bench.subjects import Subject, pixels_psnr
+from charnerf.bench.timing import Timing, in_turns
+from charnerf.bench.workbench import BASELINE
 from charnerf.types import ErrorEstimate, LeftOut, Rendering
 from charnerf.volume.renderers.base import AbstractRenderer
 
-BASELINE = "pixelNeRF-like"
 LEAST_SECONDS = 0.1  # of one turn: faster methods are repeated within it
 
 
@@ -74,19 +74,19 @@ class Measured:
 def measure(
     subject: Subject,
     renderers: Mapping[str, AbstractRenderer],
-    reference: Tensor,
     *,
     repeats: int,
     baseline: bool = True,
+    reference: Tensor | None = None,
 ) -> dict[str, Measured]:
     """Time renderers, and the baseline, on a subject's rays, in turns and without gradient.
 
     Args:
         subject: What is rendered.
         renderers: By name.
-        reference: Converged colours (R, 3).
         repeats: Turns.
         baseline: Whether the pixelNeRF-like evaluation takes part.
+        reference: Colors (R, 3) that errors are taken against; the subject's converged ones if None.
     """
     methods: dict[str, Callable[[], Any]] = {}
     if baseline:
@@ -95,7 +95,8 @@ def measure(
         methods[name] = partial(renderer.render, subject.scene, subject.rays)
     with torch.no_grad():
         timings = in_turns(methods, repeats=repeats, device=subject.truth.device, least_seconds=LEAST_SECONDS)
-    return {name: _assess(timing, subject, reference) for name, timing in timings.items()}
+    truth = subject.converged if reference is None else reference
+    return {name: _assess(timing, subject, truth) for name, timing in timings.items()}
 
 
 def _assess(timing: Timing, subject: Subject, reference: Tensor) -> Measured:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import torch
@@ -12,7 +13,6 @@ import trimesh
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelAligned
-from charnerf.bench.kinds import KINDS
 from charnerf.capture.embree import CaptureOptions, capture_character
 from charnerf.capture.procedural_data import character_seed
 from charnerf.data.characters import load_character
@@ -20,13 +20,13 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.models.charnerf import CharNeRF
 from charnerf.procedural.character import make_character
-from charnerf.types import Cameras, Hull, RayBundle, Scene, SourceViews
+from charnerf.types import Cameras, RayBundle, Scene, SourceViews
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.dense import DenseRenderer
 
+NUM_CHARACTERS, NUM_PIXELS = 4, 512
 REFERENCE_SAMPLES = 1024
 REFERENCE_STEPS = 1024  # in which the reference looks up the hull
-STARTS_AT_ZERO = ("second.weight", "score.weight")  # as the layers themselves start
 TARGET_VIEWS = 6  # captured for each subject; the last one looked at
 
 
@@ -36,7 +36,6 @@ class Subject:
 
     Attributes:
         name: Its name.
-        kind: Kind of scene.
         network: The network that it is rendered by.
         views: Its drawings, B = 1.
         scene: Its field.
@@ -47,7 +46,6 @@ class Subject:
     """
 
     name: str
-    kind: str
     network: CharNeRF
     views: SourceViews
     scene: Scene
@@ -55,6 +53,34 @@ class Subject:
     camera: Cameras
     rays: RayBundle
     truth: Tensor
+
+    @cached_property
+    @torch.no_grad()
+    def converged(self) -> Tensor:
+        """Colors (R, 3), float64, of the converged integral: dense, 1024 samples on every ray that meets the hull."""
+        scene = self.in_float64()
+        renderer = DenseRenderer(
+            quadrature=PiecewiseConstant(),
+            num_coarse=REFERENCE_SAMPLES,
+            num_fine=REFERENCE_SAMPLES,
+            hull_steps=REFERENCE_STEPS,
+            memory_mib=256,
+        )
+        rays = self.rays.to(torch.float64)
+        met = (renderer.occupied(scene, rays).length > 0).nonzero()[:, 0]
+        rgb = torch.ones_like(rays.origins)
+        for part in met.split(64):
+            rgb[part] = renderer.render(scene, rays[part]).finest.rgb
+        return rgb
+
+    def in_float64(self) -> Scene:
+        """The scene in float64 over the same hull, so that both precisions integrate over the same cells."""
+        network, hull = copy.deepcopy(self.network).double(), self.maps.hull
+        if hull is not None:
+            hull = replace(hull, **{name: value[None] for name, value in vars(hull).items()}).to(
+                torch.float64
+            )
+        return network.scene(network.encode(self.views.to(torch.float64), hull), 0)
 
 
 @dataclass(frozen=True)
@@ -96,13 +122,20 @@ def of_dataset(root: Path, split: str, count: int | None) -> list[Pictured]:
     return found
 
 
-def subject(pictured: Pictured, network: CharNeRF, *, kind: str, num_pixels: int, seed: int = 0) -> Subject:
+def prepared(network: CharNeRF, pictured: Sequence[Pictured]) -> list[Subject]:
+    """Encode characters, choose their pixels, and compute what all errors are measured against."""
+    subjects = [subject(one, network, seed=i) for i, one in enumerate(pictured)]
+    for one in subjects:
+        _ = one.converged
+    return subjects
+
+
+def subject(pictured: Pictured, network: CharNeRF, *, num_pixels: int = NUM_PIXELS, seed: int = 0) -> Subject:
     """Encode a character and choose random pixels of its target picture.
 
     Args:
         pictured: Drawings and target.
         network: The network.
-        kind: Kind of scene.
         num_pixels: Pixels drawn without replacement; all where there are fewer.
         seed: Of the draw.
     """
@@ -118,7 +151,6 @@ def subject(pictured: Pictured, network: CharNeRF, *, kind: str, num_pixels: int
     truth = (pictured.picture[..., :3] * alpha + 1.0 - alpha).reshape(-1, 3).to(device)[chosen]
     return Subject(
         name=pictured.name,
-        kind=kind,
         network=network,
         views=views,
         scene=scene,
@@ -129,78 +161,7 @@ def subject(pictured: Pictured, network: CharNeRF, *, kind: str, num_pixels: int
     )
 
 
-def subjects_by_kind(network: CharNeRF, untrained: CharNeRF, *, size: int, num_pixels: int) -> list[Subject]:
-    """One subject of each kind of scene; fog is what an untrained field of the same build answers."""
-    found = []
-    for kind, build in KINDS.items():
-        pictured = captured(kind, build(), size)
-        if kind == "empty picture":
-            pictured = _looking_away(pictured)
-        used = untrained if kind == "fog" else network
-        found.append(subject(pictured, used, kind=kind, num_pixels=num_pixels))
-    return found
-
-
-def _looking_away(pictured: Pictured) -> Pictured:
-    """The camera turned round: nothing is in its picture."""
-    pose = pictured.camera.world_from_camera.clone()
-    pose[:3, 0], pose[:3, 2] = -pose[:3, 0], -pose[:3, 2]
-    return replace(
-        pictured,
-        camera=replace(pictured.camera, world_from_camera=pose),
-        picture=torch.ones_like(pictured.picture),
-    )
-
-
-def untrained_like(network: CharNeRF, seed: int = 0) -> CharNeRF:
-    """A network of the same build with seeded weights that were never trained."""
-    fresh = copy.deepcopy(network)
-    generator = torch.Generator().manual_seed(seed)
-    with torch.no_grad():
-        for name, parameter in fresh.named_parameters():
-            if parameter.ndim < 2 or name.endswith(STARTS_AT_ZERO):
-                parameter.fill_(1.0 if "norm" in name and name.endswith("weight") else 0.0)
-            else:
-                scale = (2.0 / parameter[0].numel()) ** 0.5
-                parameter.copy_(scale * torch.randn(parameter.shape, generator=generator).to(parameter))
-    return fresh
-
-
-@torch.no_grad()
-def reference(subject_: Subject) -> Tensor:
-    """Colours (R, 3), float64, of the converged integral: dense, float64, 1024 samples on every ray that meets the hull."""
-    network = copy.deepcopy(subject_.network).double()
-    encoded = network.encode(subject_.views.to(torch.float64), hull_in_float64(subject_))
-    scene = network.scene(encoded, 0)
-    renderer = DenseRenderer(
-        quadrature=PiecewiseConstant(),
-        num_coarse=REFERENCE_SAMPLES,
-        num_fine=REFERENCE_SAMPLES,
-        hull_steps=REFERENCE_STEPS,
-        memory_mib=256,
-    )
-    rays = subject_.rays.to(torch.float64)
-    met = (renderer.occupied(scene, rays).length > 0).nonzero()[:, 0]
-    rgb = torch.ones_like(rays.origins)
-    for part in met.split(64):
-        rgb[part] = renderer.render(scene, rays[part]).finest.rgb
-    return rgb
-
-
-def hull_in_float64(subject_: Subject) -> Hull | None:
-    """The same hull, so that both precisions integrate over the same cells."""
-    hull = subject_.scene.hull
-    if hull is None:
-        return None
-    return replace(hull, **{name: value[None] for name, value in vars(hull).items()}).to(torch.float64)
-
-
 def pixels_psnr(rgb: Tensor, truth: Tensor) -> float:
     """PSNR of colours (R, 3) of random pixels, dB."""
     error = (rgb.double() - truth.double()).square().mean().clamp_min(1e-10)
     return float(-10.0 * torch.log10(error))
-
-
-def worst(values: Sequence[float]) -> float:
-    """Largest of some errors."""
-    return max(values) if values else 0.0

@@ -26,12 +26,16 @@ def _shown(value: Any) -> str:
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 
+def rows_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A table of mappings with the same keys."""
+    return markdown([name.replace("_", " ") for name in rows[0]], [tuple(row.values()) for row in rows])
+
+
 def headline_table(headline: Mapping[str, Any]) -> str:
     """The headline, one row a number."""
-    flat = [(name, value) for name, value in headline.items() if name not in ("how", "worst_kind")]
-    worst = headline.get("worst_kind", {})
-    flat += [(f"worst kind, {name.replace('_', ' ')}", value) for name, value in worst.items()]
-    return markdown(("headline", "value"), flat)
+    return markdown(
+        ("headline", "value"), [(name, value) for name, value in headline.items() if name != "how"]
+    )
 
 
 def comparison_table(comparisons: Sequence[Mapping[str, Any]]) -> str:

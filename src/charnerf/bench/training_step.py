@@ -6,15 +6,14 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from statistics import fmean, stdev
-from typing import Any
 
 import torch
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelAligned, PixelNeRFLike
-from charnerf.bench.measure import Timing, in_turns
 from charnerf.bench.subjects import Subject
+from charnerf.bench.timing import Timing, in_turns
+from charnerf.bench.workbench import BASELINE
 from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.types import RayBundle, RenderOutput
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -43,7 +42,6 @@ def step_timings(
     renderers: dict[str, AbstractRenderer],
     *,
     repeats: int,
-    baseline: str,
 ) -> dict[str, Timing]:
     """Time training steps (encode, render, loss, gradient, Adam) with each renderer and with the baseline's evaluation.
 
@@ -55,78 +53,10 @@ def step_timings(
         batch: Its rays.
         renderers: By name.
         repeats: Turns.
-        baseline: Name under which the pixelNeRF-like evaluation takes part.
     """
-    steps = {name: trainer(subject, renderer) for name, renderer in {**renderers, baseline: None}.items()}
+    steps = {name: trainer(subject, renderer) for name, renderer in {**renderers, BASELINE: None}.items()}
     methods = {name: partial(step, batch) for name, step in steps.items()}
     return in_turns(methods, repeats=repeats, device=subject.truth.device)
-
-
-def loss_curves(
-    subject: Subject,
-    renderers: dict[str, AbstractRenderer],
-    *,
-    num_rays: int,
-    steps: int,
-    seeds: int,
-    rate: float,
-    baseline: str,
-) -> dict[str, list[list[float]]]:
-    """Losses by method, seed and step; with one seed all methods see the same batches.
-
-    Args:
-        subject: The character; its rays are drawn from.
-        renderers: By name.
-        num_rays: Rays of a batch.
-        steps: Batches.
-        seeds: Of batches and jitter, from 0.
-        rate: Learning rate.
-        baseline: Name under which the pixelNeRF-like evaluation takes part.
-    """
-    curves: dict[str, list[list[float]]] = {}
-    for name, renderer in {**renderers, baseline: None}.items():
-        curves[name] = []
-        for seed in range(seeds):
-            step = trainer(subject, renderer, rate=rate, seed=seed)
-            draws = torch.Generator().manual_seed(seed)
-            losses = []
-            for _ in range(steps):
-                index = torch.randint(len(subject.truth), (num_rays,), generator=draws).to(
-                    subject.truth.device
-                )
-                losses.append(step(Batch(rays=subject.rays[index], rgb=subject.truth[index])))
-            curves[name].append(losses)
-    return curves
-
-
-def compared_curves(curves: dict[str, list[list[float]]], *, baseline: str) -> list[dict[str, Any]]:
-    """Rows of each method: its mean loss over the last third of the steps, and how far it is from the baseline's.
-
-    The noise is the spread (standard deviation) of that mean between seeds, of method and baseline together.
-    """
-    last = {
-        name: [fmean(losses[-max(1, len(losses) // 3) :]) for losses in of_seeds]
-        for name, of_seeds in curves.items()
-    }
-    rows = []
-    for name, values in last.items():
-        apart = fmean(values) - fmean(last[baseline])
-        noise = max(_spread(values), _spread(last[baseline]))
-        rows.append(
-            {
-                "method": name,
-                "first loss": fmean(losses[0] for losses in curves[name]),
-                "last third": fmean(values),
-                "off the baseline": apart,
-                "spread of seeds": noise,
-                "within it": abs(apart) <= noise,
-            }
-        )
-    return rows
-
-
-def _spread(values: list[float]) -> float:
-    return stdev(values) if len(values) > 1 else 0.0
 
 
 def trainer(
@@ -184,8 +114,3 @@ def _loss(output: RenderOutput, batch: Batch) -> Tensor:
     """Colours, and opacity where the truth is not white."""
     seen = (batch.rgb < 1.0).any(-1).to(output.opacity.dtype)
     return (output.rgb - batch.rgb).square().mean() + OPACITY_WEIGHT * (output.opacity - seen).square().mean()
-
-
-def parameters_of(network: CharNeRF) -> int:
-    """Number of weights."""
-    return sum(parameter.numel() for parameter in network.parameters())

@@ -1,12 +1,11 @@
-"""Everything a benchmark measures, made of one model."""
+"""Every renderer, made of one model, and the names that they bear in tables."""
 
-import copy
+from __future__ import annotations
+
+from dataclasses import dataclass
 from typing import Any
 
-from charnerf.bench.headline import ADAPTIVE, CULLED, DENSE, Workbench
-from charnerf.bench.subjects import untrained_like
 from charnerf.config.composition import compose_config
-from charnerf.inference import weights as runs
 from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
@@ -14,36 +13,47 @@ from charnerf.volume.renderers.base import AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
-WIDE = 512
+BASELINE, CULLED, ADAPTIVE, DENSE = "pixelNeRF-like", "culled", "adaptive", "dense"
 TRAINING_SCALE = "small"
 TOLERANCE = 0.05  # of conf/renderer/adaptive.yaml
-CHUNK_SHARE = 0.125  # of the memory budget, for one chunk of points
 
 
-def workbench(model: Model, *, memory_mib: float, tolerance: float = TOLERANCE) -> Workbench:
-    """Renderers and networks for the headline.
+@dataclass(frozen=True)
+class Workbench:
+    """What is measured.
 
-    Args:
-        model: The trained model.
-        memory_mib: Budget of a rendering or a mesh, MiB.
-        tolerance: Asked of the adaptive renderer.
+    Attributes:
+        network: The trained network.
+        like: Arguments that every renderer takes, the model's own.
+        renderers: culled, adaptive and dense, in evaluation.
+        training: culled and dense with the number of samples of training at scale=small.
+        batch_rays: Rays of a training step there.
+        image_size: Of the drawings, pixels.
     """
+
+    network: CharNeRF
+    like: dict[str, Any]
+    renderers: dict[str, AbstractRenderer]
+    training: dict[str, AbstractRenderer]
+    batch_rays: int
+    image_size: int
+
+
+def workbench(model: Model) -> Workbench:
+    """Renderers of a model's settings."""
     like = settings_of(model.renderer)
-    like["memory_mib"] = CHUNK_SHARE * memory_mib
     scale = compose_config([f"scale={TRAINING_SCALE}"]).scale
     in_training = {**like, "num_coarse": int(scale.train_num_coarse)}
     return Workbench(
         network=model.network,
-        wide=resized_network(model, WIDE),
         like=like,
         renderers={
             CULLED: CulledRenderer(**like),
-            ADAPTIVE: AdaptiveRenderer(**like, tolerance=tolerance),
+            ADAPTIVE: AdaptiveRenderer(**like, tolerance=TOLERANCE),
             DENSE: DenseRenderer(**like),
         },
         training={CULLED: CulledRenderer(**in_training), DENSE: DenseRenderer(**in_training)},
         batch_rays=int(scale.phase_rays[0]),
-        memory_mib=memory_mib,
         image_size=model.image_size,
     )
 
@@ -57,11 +67,3 @@ def settings_of(renderer: AbstractRenderer) -> dict[str, Any]:
         "hull_steps": renderer.hull_steps,
         "memory_mib": renderer.memory_mib,
     }
-
-
-def resized_network(model: Model, width: int, seed: int = 0) -> CharNeRF:
-    """A network as the model's with another width and seeded weights, on the same device."""
-    config = copy.deepcopy(model.config)
-    config.model.width = width
-    network = untrained_like(runs.build_model(config), seed)
-    return network.requires_grad_(False).eval().to(model.device)

@@ -282,36 +282,14 @@ def bench(
     weights: Weights = None,
     *,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Only the headline; under five minutes on two cores.")
+        bool, typer.Option("--quick", help="Leave out the sweep of samples and tolerances.")
     ] = False,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", dir_okay=False, help="Write all numbers there.")
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            file_okay=False,
-            help="For diagrams, tables and numbers, beside those measured before (outputs/bench; with --quick none).",
-        ),
-    ] = None,
-    part: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--part", metavar="NAME", help="Only this part; may be repeated; a wrong name lists all of them."
-        ),
-    ] = None,
-    page: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", dir_okay=False, help="Markdown file that gets the tables (DIR/bench.md)."
-        ),
-    ] = None,
-    note: Annotated[
-        str, typer.Option(metavar="TEXT", help="Stands beside the figures: what else the machine did, say.")
-    ] = "",
+        Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For the sweep's diagram.")
+    ] = Path("outputs/bench"),
     data: Annotated[
         Path | None,
         typer.Option(
@@ -323,25 +301,13 @@ def bench(
         ),
     ] = None,
     split: Annotated[str, typer.Option(metavar="NAME", help="Split of the data set.")] = "test",
-    roofline: Annotated[
-        bool, typer.Option("--roofline", help="Only the arithmetic against the machine's peak.")
-    ] = False,
-    memory: Annotated[float, typer.Option(min=64, help="Memory budget, MiB.")] = 2048,
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
-    """Measure error against run time: speed-ups over a pixelNeRF-like evaluation, and what they cost.
-
-    Prints tables; DIR gets diagrams, bench.json and bench.md after each part, so that parts can be measured one by one.
-    """
+    """Measure error against run time: speed-ups over a pixelNeRF-like evaluation, and what they cost."""
     from charnerf import commands
-    from charnerf.bench.run import Request, chosen_parts
 
-    parts = chosen_parts(["headline"] if quick and not part else part or [])
-    if output is None and not quick and not roofline:
-        output = Path("outputs/bench")
-    request = Request(parts, data, split, memory, output, page, note)
-    commands.bench(weights, request, roofline=roofline, json_file=json_file, device=device, trust=trust or [])
+    commands.bench(weights, data, split, quick, json_file, output, device=device, trust=trust or [])
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from charnerf.bench.grids import grid_sampler, hausdorff
+from benchmarks.grids import grid_sampler, hausdorff
 from charnerf.bench.subjects import Subject
 from charnerf.meshing.calibrate import choose_level
 from charnerf.meshing.extract import extract_surface

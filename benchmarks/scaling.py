@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from charnerf.bench.grids import CUBE_SIDE, grid_sampler
-from charnerf.bench.headline import ADAPTIVE, CULLED, Workbench
+from benchmarks.grids import CUBE_SIDE, grid_sampler
 from charnerf.bench.subjects import Pictured, Subject
+from charnerf.bench.workbench import ADAPTIVE, CULLED, Workbench
 from charnerf.evaluation.timing import Stopwatch
 from charnerf.geometry.resizing import resized_cameras
 from charnerf.models.charnerf import CharNeRF
@@ -89,18 +89,15 @@ def grow(over: str, work: Mapping[int, Callable[[], Any]], device: torch.device)
     return Growth(over, sizes, tuple(seconds), tuple(memory), fitted)
 
 
-def growths(
-    bench: Workbench, subject: Subject, pictured: Sequence[Pictured], views: SourceViews
-) -> list[Growth]:
+def growths(bench: Workbench, subject: Subject, pictured: Sequence[Pictured]) -> list[Growth]:
     """All the growths of the report.
 
     Args:
         bench: What is measured.
         subject: One character.
         pictured: Several, of one drawing size.
-        views: The subject's character from eight sides, B = 1.
     """
-    device = subject.truth.device
+    device, views = subject.truth.device, _more_views(subject)
     adaptive = bench.renderers[ADAPTIVE]
 
     def picture(size: int) -> Callable[[], Any]:
@@ -114,7 +111,7 @@ def growths(
         return lambda: bench.renderers[CULLED].render(scene, subject.rays)
 
     def encode(count: int) -> Callable[[], Any]:
-        batch = _batch([pictured[i % len(pictured)].views for i in range(count)])
+        batch = SourceViews.joined([pictured[i % len(pictured)].views for i in range(count)])
         return lambda: bench.network.encode(batch.to(device))
 
     def sampled(count: int) -> Callable[[], Any]:
@@ -135,5 +132,14 @@ def _scene(network: CharNeRF, views: SourceViews) -> Any:
         return network.scene(network.encode(views), 0)
 
 
-def _batch(views: Sequence[SourceViews]) -> SourceViews:
-    return SourceViews.joined(list(views))
+def _more_views(one: Subject) -> SourceViews:
+    """Eight present views made of the drawings that there are, turned about: seconds do not depend on what they show."""
+    views = one.views
+    count = views.images.shape[1]
+    index = torch.arange(8, device=views.images.device) % count
+    return SourceViews(
+        images=views.images[:, index],
+        cameras=views.cameras[:, index],
+        present=views.present[:, index],
+        mirrored=views.mirrored[:, index],
+    )

@@ -1,75 +1,69 @@
-"""The page of a benchmark: targets, tables and diagrams of all parts that were measured, between two marks of a Markdown file."""
+"""Markdown of what was measured: a table or some for each part of bench.json, the targets and the machine."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from benchmarks.setting import EMBEDDED, diagram
+from benchmarks.targets import target_rows
 from charnerf.bench.baseline import NUM_COARSE, NUM_FINE
-from charnerf.bench.rendering import BASELINE
-from charnerf.bench.tables import comparison_table, headline_table, markdown
-from charnerf.bench.targets import target_rows
-from charnerf.errors import DataError
-from charnerf.files import write_text
+from charnerf.bench.tables import comparison_table, headline_table, markdown, rows_table
+from charnerf.bench.workbench import BASELINE
 
-BEGIN, END = "<!-- figures: written by `charnerf bench` -->", "<!-- end of figures -->"
-TITLE = "# Error against run time"
-EMBEDDED = "embedded"
 BASELINE_SETTING = f"{NUM_COARSE} + {NUM_FINE}"
+Parts = Sequence[Mapping[str, Any]]
+Show = Callable[[Any], list[str]]
 
 
-def write_page(page: Path, parts: Sequence[dict[str, Any]], *, pictures: Path) -> None:
-    """Write the parts between the marks of a page; a page that is not there is begun.
+def tables(bench: Mapping[str, Any]) -> dict[str, str]:
+    """Markdown by mark: every part, "PART" of embedded characters, "PART DATASET SPLIT" of others; "targets" and "machine".
 
     Args:
-        page: Markdown file.
-        parts: As bench.json holds them, in order.
-        pictures: Folder of the diagrams.
-
-    Raises:
-        DataError: If the page is there and lacks its marks.
+        bench: As bench.json holds it.
     """
-    text = page.read_text(encoding="utf-8") if page.is_file() else f"{TITLE}\n\n{BEGIN}\n{END}\n"
-    if BEGIN not in text or END not in text.partition(BEGIN)[2]:
-        raise DataError(
-            f"{page}: found no lines '{BEGIN}' and '{END}', expected both; add them where the tables go."
-        )
-    start = text.index(BEGIN)
-    end = text.index(END, start)
-    page.parent.mkdir(parents=True, exist_ok=True)
-    folder = os.path.relpath(pictures, page.parent)
-    write_text(page, f"{text[:start]}{BEGIN}\n\n{measured(parts, Path(folder))}\n\n{text[end:]}")
+    parts: Parts = bench["parts"]
+    targets = target_rows({one["part"]: one["result"] for one in parts if one["characters"] == EMBEDDED})
+    return {
+        **({"targets": markdown(("target", "measured", "met"), targets)} if targets else {}),
+        **{mark_of(one): "\n\n".join(SECTIONS[one["part"]][1](one["result"])) for one in parts},
+        "machine": _machines(parts),
+    }
 
 
-def measured(parts: Sequence[dict[str, Any]], pictures: Path) -> str:
-    """Markdown of all parts."""
-    lines = []
-    rows = target_rows({one["part"]: one["result"] for one in parts if one["characters"] == EMBEDDED})
-    if rows:
-        lines += ["## What was asked, and what it reads", markdown(("asked", "reads", "met"), rows)]
-    for one in parts:
-        title, show = SECTIONS[one["part"]]
-        if one["part"] == "headline" and one["characters"] != EMBEDDED:
-            show = _headline_again
+def mark_of(part: Mapping[str, Any]) -> str:
+    """Name of a part's tables."""
+    where = [] if part["characters"] == EMBEDDED else [part["characters"].replace(", split", "")]
+    return " ".join([part["part"], *where])
+
+
+def page(bench: Mapping[str, Any]) -> str:
+    """A page of all that was measured, with its diagrams in the same folder."""
+    found = tables(bench)
+    lines = ["# Error against run time"]
+    if "targets" in found:
+        lines += ["## Targets", found["targets"]]
+    for one in bench["parts"]:
         where = "" if one["characters"] == EMBEDDED else f": {one['characters']}"
-        lines += [f"## {title}{where}", *show(one["result"], _suffixed(pictures, one["characters"]))]
-    return "\n\n".join([*lines, "## Machine", _machines(parts)])
+        lines.append(f"## {SECTIONS[one['part']][0]}{where}")
+        if one["part"] in DRAWN:
+            lines.append(f"![{one['part']}]({diagram(one['part'], one['characters'])})")
+        lines.append(found[mark_of(one)])
+    return "\n\n".join([*lines, "## Machine", found["machine"]]) + "\n"
 
 
-def _machines(parts: Sequence[dict[str, Any]]) -> str:
+def _machines(parts: Parts) -> str:
     """Where each part was measured."""
     rows = []
     for one in parts:
-        known = one["environment"]
+        where = one["environment"]
         rows.append(
             (
                 one["part"],
                 one["characters"],
-                known["machine"] if known["device"] == "cpu" else f"{known['device']}, {known['machine']}",
-                known["threads"],
-                known["torch"],
+                where["machine"] if where["device"] == "cpu" else f"{where['device']}, {where['machine']}",
+                where["threads"],
+                where["torch"],
                 one["weights"],
                 one["seconds"],
                 one["note"] or None,
@@ -78,45 +72,20 @@ def _machines(parts: Sequence[dict[str, Any]]) -> str:
     return markdown(("part", "characters", "machine", "threads", "torch", "weights", "seconds", "note"), rows)
 
 
-Picture = Callable[[str], str]
+def _headline(found: Any) -> list[str]:
+    how = "\n".join(f"- `{name}`: {text}" for name, text in found["headline"]["how"].items())
+    return [headline_table(found["headline"]), how, comparison_table(found["characters"])]
 
 
-def _suffixed(pictures: Path, characters: str) -> Picture:
-    """Names a diagram in Markdown; those of a data set bear its name and split."""
-    suffix = "" if characters == EMBEDDED else "_" + characters.replace(", split ", "_")
-    return lambda name: f"![{name}]({(pictures / f'{name}{suffix}.png').as_posix()})"
-
-
-def _headline(found: Any, picture: Picture) -> list[str]:
-    kinds = [{**one, "name": one["kind"]} for one in found["kinds"]]
-    return [
-        headline_table(found["headline"]),
-        "\n".join(f"- `{name}`: {text}" for name, text in found["headline"]["how"].items()),
-        "Characters:",
-        comparison_table(found["characters"]),
-        "Kinds of scene:",
-        comparison_table(kinds),
-    ]
-
-
-def _headline_again(found: Any, picture: Picture) -> list[str]:
-    """Of a data set: kinds of scene and how it is measured are as above."""
-    return [headline_table(found["headline"]), comparison_table(found["characters"])]
-
-
-def _diagram(name: str) -> Callable[[Any, Picture], list[str]]:
-    return lambda found, picture: [picture(name), rows_table(found)]
-
-
-def _table(text: str = "") -> Callable[[Any, Picture], list[str]]:
-    def show(found: Any, picture: Picture) -> list[str]:
+def _table(text: str = "") -> Show:
+    def show(found: Any) -> list[str]:
         rows = found if isinstance(found, list) else [found]
         return [*([text] if text else []), rows_table(rows) if rows else "The model has no hull."]
 
     return show
 
 
-def _kinds(found: Any, picture: Picture) -> list[str]:
+def _kind_samples(found: Any) -> list[str]:
     """The fastest setting of each method that is as accurate as the baseline, on every kind."""
     rows = []
     for kind, some in found.items():
@@ -130,14 +99,13 @@ def _kinds(found: Any, picture: Picture) -> list[str]:
             errors = {name: best[name] for name in ("rms_error", "max_error")}
             rows.append({"kind": kind, **shown, "speed-up": base["seconds"] / best["seconds"], **errors})
     return [
-        picture("kinds"),
         f"The fastest setting of each method whose rms error is at most that of `{BASELINE}` with {BASELINE_SETTING} samples, "
         "and its speed-up over that; a method without such a setting is left out. All points are in bench.json.",
         rows_table(rows) if rows else "No setting is.",
     ]
 
 
-def _size(found: Any, picture: Picture) -> list[str]:
+def _size(found: Any) -> list[str]:
     rows = [{"method": name, **numbers} for name, numbers in found["methods"].items()]
     return [
         f"`experiment=pixelnerf scale=paper`: {found['parameters']:,} parameters with its encoder ({found['encoder']}; "
@@ -148,7 +116,7 @@ def _size(found: Any, picture: Picture) -> list[str]:
     ]
 
 
-def _steps(found: Any, picture: Picture) -> list[str]:
+def _steps(found: Any) -> list[str]:
     rows = [
         {
             "scale": one["scale"],
@@ -166,29 +134,25 @@ def _steps(found: Any, picture: Picture) -> list[str]:
     ]
 
 
-def _scaling(found: Any, picture: Picture) -> list[str]:
+def _scaling(found: Any) -> list[str]:
     rows = [
         {k: ", ".join(map(_short, v)) if isinstance(v, list) else v for k, v in one.items()} for one in found
     ]
-    return [picture("scaling"), rows_table(rows)]
+    return [rows_table(rows)]
 
 
 def _short(value: float) -> str:
     return f"{value:.3g}"
 
 
-def rows_table(rows: Sequence[dict[str, Any]]) -> str:
-    """A table of dicts with the same keys."""
-    return markdown([name.replace("_", " ") for name in rows[0]], [tuple(row.values()) for row in rows])
-
-
-SECTIONS: dict[str, tuple[str, Callable[[Any, Picture], list[str]]]] = {
+SECTIONS: dict[str, tuple[str, Show]] = {
     "headline": ("Headline", _headline),
-    "samples": ("Samples a ray and tolerances", _diagram("samples")),
-    "kinds": ("Kinds of scene", _kinds),
-    "tricks": ("One trick off at a time", _diagram("tricks")),
-    "precision": ("Precision", _diagram("precision")),
-    "compile": ("Compiled", _diagram("compile")),
+    "samples": ("Samples a ray and tolerances", _table()),
+    "kinds": ("Kinds of scene", lambda found: [comparison_table(found)]),
+    "kind_samples": ("Samples a ray on kinds of scene", _kind_samples),
+    "tricks": ("One trick off at a time", _table()),
+    "precision": ("Precision", _table()),
+    "compile": ("Compiled", _table()),
     "exactness": (
         "Culled is dense",
         _table(
@@ -209,15 +173,27 @@ SECTIONS: dict[str, tuple[str, Callable[[Any, Picture], list[str]]]] = {
         ),
     ),
     "size": ("At pixelNeRF's size", _size),
+    "arithmetic": (
+        "Arithmetic",
+        _table(
+            "Products and convolutions counted by torch while 512 pixels are rendered, over the best of the seconds timed, over "
+            "the best by square products of side 2048; width 512 with seeded weights."
+        ),
+    ),
     "steps": ("Training steps", _steps),
     "losses": (
         "Loss curves",
-        lambda found, picture: [
+        _table(
             "One character from seeded weights, `scale=small`, 128 rays a step, three seeds of batches that all methods share. "
-            "The last third of the steps, its distance from the baseline's, and the spread of seeds:",
-            picture("losses"),
-            rows_table(found),
-        ],
+            "The last third of the steps, its distance from the baseline's, and the spread of seeds."
+        ),
+    ),
+    "grids": (
+        "Grids",
+        _table(
+            "`share`: distinct grid points evaluated over 257^3 in a cube of side 2.2 m, 8 cameras; `all share`: of all points "
+            "inside the hull; `same`: the same faces, or a Hausdorff distance of vertices below 1e-4 m."
+        ),
     ),
     "meshes": ("Meshes", _table("`distance`: the largest to the surface of a grid of 256 cells, m.")),
     "memory": ("Memory by size", _table("Peak over the loaded, encoded model, a fresh process each.")),
@@ -231,3 +207,4 @@ SECTIONS: dict[str, tuple[str, Callable[[Any, Picture], list[str]]]] = {
     ),
     "builds": ("Builds", _table("Seeded weights.")),
 }
+DRAWN = ("samples", "kind_samples", "tricks", "precision", "compile", "losses", "scaling")

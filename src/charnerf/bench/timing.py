@@ -61,8 +61,3 @@ def in_turns(
         name: Timing(median(taken), min(taken), max(taken), len(taken), answers[name])
         for name, taken in seconds.items()
     }
-
-
-def ratio_of_medians(timings: Mapping[str, Timing], slow: str, fast: str) -> float:
-    """How many times faster one method is than another."""
-    return timings[slow].median / timings[fast].median

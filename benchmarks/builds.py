@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
 import torch
 
-from charnerf.bench.headline import ADAPTIVE, CULLED
-from charnerf.bench.measure import in_turns
-from charnerf.bench.rendering import BASELINE, measure
-from charnerf.bench.subjects import Pictured, reference, subject, untrained_like
-from charnerf.bench.training_step import batch_of, parameters_of, step_timings
-from charnerf.bench.workbench import settings_of
-from charnerf.config.composition import compose_config
+from benchmarks.untrained import network_of, parameters_of
+from charnerf.bench.rendering import measure
+from charnerf.bench.subjects import Pictured, subject
+from charnerf.bench.timing import in_turns
+from charnerf.bench.workbench import ADAPTIVE, BASELINE, CULLED, settings_of
 from charnerf.inference import weights as runs
-from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.base import AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
-from charnerf.volume.renderers.dense import DenseRenderer
 
 BUILDS = {
     "default": (),
@@ -41,20 +37,12 @@ FEWER = 4  # times fewer samples on the hull's segments than over the box
 LARGE_TOLERANCE = 0.05
 
 
-def network_of(overrides: Sequence[str]) -> tuple[CharNeRF, Any]:
-    """A network of a composed config with seeded weights, and the config."""
-    cfg = compose_config(list(overrides))
-    return untrained_like(runs.build_model(cfg)).requires_grad_(False).eval(), cfg
-
-
-def architecture_rows(
-    pictured: Pictured, like: dict[str, Any], *, num_pixels: int, repeats: int
-) -> list[dict[str, Any]]:
+def build_rows(pictured: Pictured, like: dict[str, Any], *, repeats: int) -> list[dict[str, Any]]:
     """Seconds to encode and to render some pixels by renderer=culled, of each build."""
     rows = []
     for name, overrides in BUILDS.items():
         network, _ = network_of(overrides)
-        one = subject(pictured, network, kind=name, num_pixels=num_pixels)
+        one = subject(pictured, network)
         renderer = CulledRenderer(**like)
         methods: dict[str, Callable[[], Any]] = {
             "encode": partial(network.encode, one.views),
@@ -83,13 +71,13 @@ def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
     network, cfg = network_of(PIXELNERF if has_resnet else PIXELNERF + WITHOUT_RESNET)
     like = settings_of(runs.build_renderer(cfg))
     fewer = {**like, **{name: like[name] // FEWER for name in ("num_coarse", "num_fine")}}
-    one = subject(pictured, network, kind="pixelNeRF's size", num_pixels=NUM_RAYS)
+    one = subject(pictured, network, num_pixels=NUM_RAYS)
     renderers: dict[str, AbstractRenderer] = {
         f"{CULLED} {like['num_coarse']} + {like['num_fine']}": CulledRenderer(**like),
         f"{CULLED} {fewer['num_coarse']} + {fewer['num_fine']}": CulledRenderer(**fewer),
         f"{ADAPTIVE} {LARGE_TOLERANCE}": AdaptiveRenderer(**like, tolerance=LARGE_TOLERANCE),
     }
-    found = measure(one, renderers, reference(one), repeats=repeats)
+    found = measure(one, renderers, repeats=repeats)
     base = found[BASELINE].seconds
     return {
         "parameters": parameters_of(network),
@@ -105,22 +93,4 @@ def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
             }
             for name, one in found.items()
         },
-    }
-
-
-def step_at_scale(pictured: Pictured, scale: str, *, repeats: int) -> dict[str, Any]:
-    """A training step at a scale, seeded weights, the rays of its first phase: packed, dense, and as the baseline."""
-    network, cfg = network_of((f"scale={scale}",))
-    num_rays = int(cfg.scale.phase_rays[0])
-    renderer = runs.build_renderer(cfg)
-    like = {**settings_of(renderer), "num_coarse": int(cfg.scale.train_num_coarse)}
-    one = subject(pictured, network, kind=scale, num_pixels=num_rays)
-    renderers = {CULLED: CulledRenderer(**like), "dense": DenseRenderer(**like)}
-    timings = step_timings(one, batch_of(one, num_rays), renderers, repeats=repeats, baseline=BASELINE)
-    fast = timings[CULLED].median
-    return {
-        "scale": scale,
-        "rays": num_rays,
-        "seconds": {name: timing.median for name, timing in timings.items()},
-        "speedup_of_culled": {name: timing.median / fast for name, timing in timings.items()},
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from statistics import median
 from typing import Any
@@ -12,10 +12,9 @@ import torch
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelNeRFLike
-from charnerf.bench.headline import Workbench
-from charnerf.bench.measure import in_turns
 from charnerf.bench.subjects import Subject, pixels_psnr
-from charnerf.bench.tricks import precise_scene, variants
+from charnerf.bench.timing import in_turns
+from charnerf.bench.workbench import ADAPTIVE, BASELINE, CULLED, DENSE, Workbench
 from charnerf.types import Rendering
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -59,7 +58,6 @@ class Row:
 def sweep(
     methods: Mapping[tuple[str, str], Method],
     subjects: Sequence[Subject],
-    references: Sequence[Tensor],
     *,
     repeats: int,
 ) -> list[Row]:
@@ -68,7 +66,7 @@ def sweep(
     spreads: dict[tuple[str, str], list[float]] = {key: [] for key in methods}
     errors: dict[tuple[str, str], list[Tensor]] = {key: [] for key in methods}
     psnrs: dict[tuple[str, str], list[float]] = {key: [] for key in methods}
-    for subject, truth in zip(subjects, references, strict=True):
+    for subject in subjects:
         with torch.no_grad():
             calls = {"\n".join(key): method(subject) for key, method in methods.items()}
             timings = in_turns(calls, repeats=repeats, device=subject.truth.device, most_seconds=SLOW_SECONDS)
@@ -77,7 +75,7 @@ def sweep(
             answer = timing.answer.finest.rgb if isinstance(timing.answer, Rendering) else timing.answer.rgb
             seconds[curve, setting].append(timing.median)
             spreads[curve, setting].append(timing.high / timing.low)
-            errors[curve, setting].append((answer.double() - truth).abs())
+            errors[curve, setting].append((answer.double() - subject.converged).abs())
             psnrs[curve, setting].append(pixels_psnr(answer, subject.truth))
     return [
         Row(
@@ -98,38 +96,15 @@ def sample_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
     like = bench.like
     methods: dict[tuple[str, str], Method] = {}
     for coarse, fine in BASELINE_SAMPLES:
-        methods["pixelNeRF-like", f"{coarse} + {fine}"] = partial(_baseline, coarse, fine)
+        methods[BASELINE, f"{coarse} + {fine}"] = partial(_baseline, coarse, fine)
     for count in DENSE_SAMPLES:
-        methods["dense", str(count)] = partial(_render, DenseRenderer(**{**like, "num_coarse": count}))
+        methods[DENSE, str(count)] = partial(rendered_by, DenseRenderer(**{**like, "num_coarse": count}))
     for count in SAMPLES:
-        methods["culled", str(count)] = partial(_render, CulledRenderer(**{**like, "num_coarse": count}))
+        methods[CULLED, str(count)] = partial(rendered_by, CulledRenderer(**{**like, "num_coarse": count}))
     for tolerance in TOLERANCES:
         adaptive = AdaptiveRenderer(**like, tolerance=tolerance)
-        methods["adaptive", f"tolerance {tolerance:g}"] = partial(_render, adaptive)
+        methods[ADAPTIVE, f"tolerance {tolerance:g}"] = partial(rendered_by, adaptive)
     return methods
-
-
-def trick_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
-    """Each trick off while the others stay on, by renderer=culled with its own number of samples."""
-    return {("one trick off", name): build for name, build in variants(bench).items()}
-
-
-def precision_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
-    """Precisions of the field, by renderer=culled."""
-    culled = bench.renderers["culled"]
-    methods: dict[tuple[str, str], Method] = {("precision", "float32"): partial(_render, culled)}
-    methods["precision", "float64"] = partial(_in_float64, culled)
-    methods["precision", "bfloat16 (autocast)"] = partial(_autocast, culled)
-    return methods
-
-
-def compiled_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
-    """The field as it is and compiled, by renderer=culled; compiling is warm-up and not counted."""
-    culled = bench.renderers["culled"]
-    return {
-        ("compile", "eager"): partial(_render, culled),
-        ("compile", "torch.compile"): partial(_compiled, culled),
-    }
 
 
 def _baseline(coarse: int, fine: int, subject: Subject) -> Callable[[], Any]:
@@ -137,27 +112,9 @@ def _baseline(coarse: int, fine: int, subject: Subject) -> Callable[[], Any]:
     return partial(method.render, subject.maps, subject.rays)
 
 
-def _render(renderer: Any, subject: Subject) -> Callable[[], Any]:
+def rendered_by(renderer: Any, subject: Subject) -> Callable[[], Any]:
+    """The call that renders a subject's rays."""
     return partial(renderer.render, subject.scene, subject.rays)
-
-
-def _in_float64(renderer: Any, subject: Subject) -> Callable[[], Any]:
-    scene, rays = precise_scene(subject), subject.rays.to(torch.float64)
-    return partial(renderer.render, scene, rays)
-
-
-def _autocast(renderer: Any, subject: Subject) -> Callable[[], Any]:
-    def render() -> Rendering:
-        with torch.autocast(subject.truth.device.type, torch.bfloat16):
-            return renderer.render(subject.scene, subject.rays)
-
-    return render
-
-
-def _compiled(renderer: Any, subject: Subject) -> Callable[[], Any]:
-    field = torch.compile(subject.scene.coarse, dynamic=True)
-    scene = replace(subject.scene, coarse=field)
-    return partial(renderer.render, scene, subject.rays)
 
 
 def pareto(rows: Sequence[Row]) -> list[Row]:

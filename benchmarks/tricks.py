@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,20 +12,19 @@ import torch
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelNeRFLike
-from charnerf.bench.headline import Workbench
-from charnerf.bench.subjects import Subject, hull_in_float64
+from charnerf.bench.subjects import Subject
+from charnerf.bench.sweep import Method
+from charnerf.bench.workbench import CULLED, Workbench
 from charnerf.geometry.hull import may_hold
 from charnerf.models.lookup import maps_to_rows
 from charnerf.types import FieldOutput, Scene
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
-Variant = Callable[[Subject], Callable[[], Any]]
 
-
-def variants(bench: Workbench) -> dict[str, Variant]:
+def variants(bench: Workbench) -> dict[str, Method]:
     """By name what renders a subject with a trick off."""
-    culled = bench.renderers["culled"]
+    culled = bench.renderers[CULLED]
     like = bench.like
 
     def on(subject: Subject) -> Callable[[], Any]:
@@ -109,8 +107,6 @@ def _unhoisted(subject: Subject) -> Callable[[Tensor, Tensor], FieldOutput]:
     return answer
 
 
-def precise_scene(subject: Subject) -> Scene:
-    """The subject's scene in float64, over the same hull."""
-    network = copy.deepcopy(subject.network).double()
-    encoded = network.encode(subject.views.to(torch.float64), hull_in_float64(subject))
-    return network.scene(encoded, 0)
+def trick_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
+    """Each trick off while the others stay on, by renderer=culled with its own number of samples."""
+    return {("one trick off", name): build for name, build in variants(bench).items()}

@@ -5,9 +5,15 @@ All stand in the world frame: metres, 2 m tall on z = 0, facing -Y.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+import torch
 import trimesh
+
+from benchmarks.untrained import untrained_like
+from charnerf.bench.subjects import Pictured, Subject, captured, subject
+from charnerf.models.charnerf import CharNeRF
 
 Color = tuple[int, int, int]
 SKIN, SHIRT, TROUSERS, STEEL, CLOTH = (
@@ -95,3 +101,27 @@ KINDS: dict[str, Callable[[], trimesh.Scene]] = {
     "fog": compact,  # with an untrained field
     "empty picture": compact,  # with a camera that looks away
 }
+
+
+def subjects_by_kind(network: CharNeRF, *, size: int) -> list[Subject]:
+    """One subject of each kind of scene; fog is what an untrained field of the same build answers."""
+    fog = untrained_like(network)
+    found = []
+    for kind, build in KINDS.items():
+        pictured = captured(kind, build(), size)
+        if kind == "empty picture":
+            pictured = _looking_away(pictured)
+        used = fog if kind == "fog" else network
+        found.append(subject(pictured, used))
+    return found
+
+
+def _looking_away(pictured: Pictured) -> Pictured:
+    """The camera turned round: nothing is in its picture."""
+    pose = pictured.camera.world_from_camera.clone()
+    pose[:3, 0], pose[:3, 2] = -pose[:3, 0], -pose[:3, 2]
+    return replace(
+        pictured,
+        camera=replace(pictured.camera, world_from_camera=pose),
+        picture=torch.ones_like(pictured.picture),
+    )

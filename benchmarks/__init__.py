@@ -1,0 +1,1 @@
+"""Laboratory benchmarks: `python -m benchmarks --help`."""
