@@ -248,11 +248,6 @@ def test_phases_that_do_not_ascend_are_named() -> None:
     )
 
 
-def test_near_below_far_wherever_they_stand() -> None:
-    message = problem("++batches.near=3.0", "++batches.far=2.0")
-    assert "batches.near: found 3.0, expected below batches.far = 2.0." in message
-
-
 def test_settings_that_would_be_overwritten_are_refused() -> None:
     assert (
         problem("++encoder.in_channels=3", "encoder=single")

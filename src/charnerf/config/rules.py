@@ -5,7 +5,6 @@ from typing import Any
 
 from hydra.utils import get_object
 
-from charnerf.config.problems import Problems, join
 from charnerf.errors import ConfigError
 from charnerf.schedule import Phase, PhaseSchedule
 
@@ -82,19 +81,6 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     _at_least_one("data.val"),
     _at_least_one("data.test"),
 )
-
-
-def check_ranges(plain: Any, key: str, problems: Problems) -> None:
-    """Find every section with `near` and `far` whose near is not below its far."""
-    if isinstance(plain, list):
-        plain = dict(enumerate(plain))
-    if not isinstance(plain, Mapping):
-        return
-    near, far = plain.get("near"), plain.get("far")
-    if isinstance(near, int | float) and isinstance(far, int | float) and not near < far:
-        problems.add(join(key, "near"), f"found {near}, expected below {join(key, 'far')} = {far}.")
-    for name, value in plain.items():
-        check_ranges(value, join(key, name), problems)
 
 
 def idle_settings(plain: Mapping[str, Any]) -> list[str]:

@@ -14,7 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from charnerf.config.checks import BROKEN, MISSING, check_section
 from charnerf.config.problems import Problems, join
-from charnerf.config.rules import RULES, check_ranges, idle_settings
+from charnerf.config.rules import RULES, idle_settings
 from charnerf.config.schema import LATER_SECTIONS, MODEL_SECTIONS, RunConfig
 from charnerf.errors import ConfigError
 
@@ -111,7 +111,6 @@ def _validate_against(schema: type, cfg: DictConfig, trusted_targets: Sequence[s
         if not any(value is BROKEN or problems.touch(key) for key, value in zip(keys, values, strict=True)):
             for key, message in rule(*values):
                 problems.add(key, message)
-    check_ranges(plain, "", problems)
     if problems.found:
         raise ConfigError(as_message(problems.lines()))
 
