@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import charnerf
-from charnerf.config.composition import conf_folder
+from charnerf.config.options import conf_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

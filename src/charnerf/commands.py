@@ -14,6 +14,7 @@ from omegaconf import OmegaConf
 from charnerf.capture.dataset import capture_dataset
 from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.lights import Headlight, Unlit
+from charnerf.config.options import option
 from charnerf.data.characters import load_character
 from charnerf.data.digest import split_digest
 from charnerf.data.layout import read_dataset
@@ -35,14 +36,6 @@ from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
 
 LIGHTS = {"unlit": Unlit, "headlight": Headlight}
-RENDERERS = {
-    "culled": "charnerf.volume.renderers.culled.CulledRenderer",
-    "dense": "charnerf.volume.renderers.dense.DenseRenderer",
-    "adaptive": "charnerf.volume.renderers.adaptive.AdaptiveRenderer",
-}
-
-
-TOLERANCE = 0.05  # of conf/renderer/adaptive.yaml
 
 
 def say(text: str) -> None:
@@ -58,11 +51,9 @@ def load_model(path: Path | None, *, device: str, trust: Sequence[str], renderer
         say(f"{model.source}: {model.note}")
     if renderer is None:
         return model
-    shared = {name: value for name, value in model.config.renderer.items() if name != "tolerance"}
-    own = {"tolerance": TOLERANCE} if renderer == "adaptive" else {}
-    changed = OmegaConf.create(OmegaConf.to_container(model.config, resolve=True))
-    changed.renderer = {**shared, "_target_": RENDERERS[renderer], **own}
-    return replace(model, renderer=runs.build_renderer(changed))  # type: ignore[arg-type]
+    changed = OmegaConf.masked_copy(model.config, ["quadrature"])
+    changed.renderer = option("renderer", renderer, like=model.config.renderer)
+    return replace(model, renderer=runs.build_renderer(changed))
 
 
 def pick_device(name: str) -> torch.device:

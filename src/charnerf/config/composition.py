@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hydra import compose, initialize_config_dir
-from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
-from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
@@ -19,11 +17,12 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from charnerf.config.hints import nearest
+from charnerf.config.hydra_internals import looks_only, read_arguments, split_sweep
+from charnerf.config.options import conf_folder
 from charnerf.config.validation import check_files, validate, warn_of_idle_settings
 from charnerf.errors import CharNeRFError, ConfigError
 
 FAILED, WRONG_CALL = 1, 2
-LOOKS_ONLY = ("help", "hydra_help", "version", "cfg", "info", "shell_completion")
 
 
 def compose_config(
@@ -45,25 +44,14 @@ def compose_config(
     return cfg
 
 
-def conf_folder() -> Path:
-    """Folder of the config files: inside the installed package, or beside `src` in a checkout."""
-    here = Path(__file__).resolve().parents[1]
-    for folder in (here / "conf", here.parents[1] / "conf"):
-        if (folder / "train.yaml").is_file():
-            return folder
-    raise ConfigError(
-        f"{here / 'conf'}: no config files found, expected train.yaml there; install charnerf again."
-    )
-
-
 def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
     """Compose and validate every job that a command line of `train.py` asks for.
 
     Raises:
         ConfigError: Lists what is wrong with the first job that has a problem, and how many others have.
     """
-    args = get_args_parser().parse_args(list(arguments))
-    if any(getattr(args, name, None) for name in LOOKS_ONLY):
+    args = read_arguments(arguments)
+    if looks_only(args):
         return
     name = (args.config_name or "train").removesuffix(".yaml")
     folder = Path(args.config_path).resolve() if args.config_path else conf
@@ -149,9 +137,7 @@ def parse_overrides(overrides: Sequence[str]) -> list[Override]:
 def _jobs(overrides: Sequence[str]) -> list[list[str]]:
     """The overrides of every job of a sweep."""
     try:
-        return [
-            job for batch in BasicSweeper.split_arguments(parse_overrides(overrides), None) for job in batch
-        ]
+        return split_sweep(parse_overrides(overrides))
     except HydraException as error:
         raise ConfigError(f"{' '.join(overrides)}: {error}") from error
 

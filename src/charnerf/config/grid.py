@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hydra._internal.utils import get_args_parser
 from omegaconf import DictConfig, OmegaConf
 
-from charnerf.config.composition import LOOKS_ONLY, parse_overrides
+from charnerf.config.composition import parse_overrides
+from charnerf.config.hydra_internals import looks_only, read_arguments
 
 GRIDS = Path("outputs/grid")
 SETTABLE = ("hydra.sweep.dir", "hydra.job.config.override_dirname.exclude_keys")
@@ -45,8 +45,8 @@ def grid_command(arguments: Sequence[str]) -> GridCommand | None:
     Raises:
         ConfigError: If an override can not be read.
     """
-    args = get_args_parser().parse_args(list(arguments))
-    if not args.multirun or any(getattr(args, name, None) for name in LOOKS_ONLY):
+    args = read_arguments(arguments)
+    if not args.multirun or looks_only(args):
         return None
     parsed = {one.key_or_group: one for one in parse_overrides(args.overrides)}
     own = {key: one for key, one in parsed.items() if key.split(".")[0].split("/")[0] != "hydra"}
