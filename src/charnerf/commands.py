@@ -20,7 +20,7 @@ from charnerf.data.digest import split_digest
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.evaluate import evaluate as evaluate_split
-from charnerf.evaluation.evaluate import write_metrics
+from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.files import write_text
 from charnerf.geometry.resizing import resized_cameras
@@ -155,16 +155,15 @@ def evaluate(
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
     metrics = evaluate_split(
-        model.any_size,
+        model.any_size,  # type: ignore[arg-type]
         model.renderer,
         data,
         split,
         views="all" if views == "all" else int(views),
         output=output,
         mesh=None if resolution is None else partial(build_mesh, resolution=resolution),
-        device=model.device,
         baselines=baselines,
-        nearest=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
+        training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=train_seconds(model.source),
     )
     if output is not None:

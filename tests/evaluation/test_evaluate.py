@@ -1,5 +1,4 @@
 import csv
-import dataclasses
 import json
 import math
 from types import SimpleNamespace
@@ -10,15 +9,15 @@ import torch
 from PIL import Image
 
 from charnerf.data.characters import load_character
-from charnerf.errors import DataError, NumericalError
-from charnerf.evaluation import evaluate as evaluation
+from charnerf.errors import NumericalError
 from charnerf.evaluation import metrics
-from charnerf.evaluation.angles import azimuth_bin, view_angles
-from charnerf.evaluation.evaluate import evaluate, fixed_views, write_metrics
+from charnerf.evaluation.evaluate import evaluate
+from charnerf.evaluation.frames import fixed_views
+from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.pictures import on_white
 from charnerf.types import LeftOut, RenderOutput
-from support.figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, target_cameras, write_figure
+from support.figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, write_figure
 
 
 def make_mesh(scene, views):
@@ -103,40 +102,6 @@ def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):
     assert (output / "images" / "doll" / "sheet.png").is_file()
 
 
-def test_fixed_views_are_the_same_every_time_and_spread(figure_dataset):
-    character = load_character(figure_dataset, "ball")
-    assert fixed_views(character, 3) == fixed_views(character, 3)
-    assert len(set(fixed_views(character, 3))) == 3
-    assert fixed_views(character, 100) == fixed_views(character, "all") == list(range(7))
-    with pytest.raises(DataError, match="views: found 0"):
-        fixed_views(character, 0)
-
-
-@pytest.mark.parametrize("num_frames", [24, 64, 100, 200])
-def test_fixed_views_reach_every_azimuth_whatever_the_number_of_frames(figure_dataset, num_frames):
-    """Every n-th of 64 or 100 Fibonacci frames leaves four azimuth bins of twelve empty."""
-    character = dataclasses.replace(
-        load_character(figure_dataset, "ball"), cameras=target_cameras(num_frames)
-    )
-    chosen = fixed_views(character, 24)
-    found = view_angles(character.cameras[chosen], character.sources)
-    assert len({azimuth_bin(float(azimuth)) for azimuth in found.azimuth_deg}) == 12
-    assert float(found.elevation_deg.mean()) == pytest.approx(32.7, abs=2.0)
-
-
-def test_source_views_are_never_counted(figure_dataset):
-    character = load_character(figure_dataset, "ball")
-    sources = character.sources.cameras
-    poses = character.cameras.world_from_camera.clone()
-    poses[2] = sources.world_from_camera[0, 1]
-    parallel = character.cameras.orthographic.clone()
-    cameras = dataclasses.replace(character.cameras, world_from_camera=poses)
-    assert 2 in fixed_views(dataclasses.replace(character, cameras=cameras), "all")  # a pinhole is no drawing
-    parallel[2] = True
-    cameras = dataclasses.replace(cameras, orthographic=parallel)
-    assert 2 not in fixed_views(dataclasses.replace(character, cameras=cameras), "all")
-
-
 def test_what_was_not_made_is_null_with_its_reason(figure_dataset):
     found = evaluate(
         BlindModel(), WhiteRenderer(), figure_dataset, "test", views=1, baselines=False, progress=False
@@ -200,24 +165,3 @@ def test_metrics_are_written_whole_or_not_at_all(tmp_path):
         write_metrics(path, {"psnr": math.nan})
     assert json.loads(path.read_text()) == {"psnr": 1.5}
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_baselines_of_the_same_views_are_measured_once_a_process(figure_dataset, monkeypatch):
-    """A grid's cells share their characters: the second one finds the baselines' figures, and its own are its own."""
-    first = evaluate(HullModel(), HullRenderer(), figure_dataset, "test", views=3, progress=False)
-    scored = []
-    score = evaluation.score_view
-
-    def counted(picture, *rest, **more):
-        scored.append(picture)
-        return score(picture, *rest, **more)
-
-    monkeypatch.setattr(evaluation, "score_view", counted)
-    second = evaluate(BlindModel(), WhiteRenderer(), figure_dataset, "test", views=3, progress=False)
-    assert len(scored) == 2 * 3  # ours alone
-    assert second["baselines"].keys() == first["baselines"].keys()
-    for name, found in second["baselines"].items():
-        assert {key: value for key, value in found.items() if key != "seconds"} == {
-            key: value for key, value in first["baselines"][name].items() if key != "seconds"
-        }
-    assert second["psnr"] != first["psnr"]

@@ -81,7 +81,7 @@ def test_evaluation_fills_every_metric_and_says_why_where_it_can_not(training, f
 
     def measure(known):
         model, renderer = HullModel(), WhiteRenderer()
-        options = {"views": 2, "progress": False, "nearest": known}
+        options = {"views": 2, "progress": False, "training": known}
         return evaluate(model, renderer, figure_dataset, "test", **options)["baselines"]["nearest"]
 
     found = measure(TrainingCharacters([(training, "test")]))
@@ -104,7 +104,7 @@ def test_a_sheet_shows_it(training, figure_dataset, tmp_path):
     known = TrainingCharacters([(training, "test")])
     arguments = (HullModel(), HullRenderer(), figure_dataset, "test")
     for name, nearest in (("with", known), ("without", None)):
-        evaluate(*arguments, views=1, output=tmp_path / name, nearest=nearest, progress=False)
+        evaluate(*arguments, views=1, output=tmp_path / name, training=nearest, progress=False)
     sizes = [(tmp_path / name / "images/doll/sheet.png").stat().st_size for name in ("with", "without")]
     assert sizes[0] > sizes[1]
     rows = (tmp_path / "with/views.csv").read_text().splitlines()

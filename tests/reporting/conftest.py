@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.evaluation.evaluate import evaluate, write_metrics
+from charnerf.evaluation.evaluate import evaluate
+from charnerf.evaluation.metrics_file import write_metrics
 from support.figures import HullModel, HullRenderer, write_figure
 
 

@@ -105,6 +105,8 @@ class HullScene:
 class BlindModel:
     """Sees nothing: for renderers that need no scene."""
 
+    device = torch.device("cpu")
+
     def encode(self, views: SourceViews) -> None:
         return None
 
@@ -114,6 +116,8 @@ class BlindModel:
 
 class HullModel:
     """Answers the visual hull of the drawings, as a trained model would answer its field."""
+
+    device = torch.device("cpu")
 
     def encode(self, views: SourceViews) -> SourceViews:
         return views

@@ -20,6 +20,7 @@ ELEVATION_EDGES_DEG = (-90, -60, -30, -15, 0, 15, 30, 45, 60, 75, 90)
 SOURCE_EDGES_DEG = (0, 15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 165, 180)
 """Bins beyond 90 degrees are listed only where views fall into them: front, side and back leave none."""
 
+ANGLE_KEYS = ("azimuth_deg", "elevation_deg", "source_angle_deg")
 Record = Mapping[str, float | None]
 
 
@@ -30,6 +31,11 @@ class ViewAngles:
     azimuth_deg: Tensor
     elevation_deg: Tensor
     source_deg: Tensor
+
+    def records(self) -> list[Record]:
+        """One record a view: azimuth_deg, elevation_deg, source_angle_deg."""
+        columns = (self.azimuth_deg.tolist(), self.elevation_deg.tolist(), self.source_deg.tolist())
+        return [dict(zip(ANGLE_KEYS, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def view_angles(cameras: Cameras, sources: SourceViews) -> ViewAngles:

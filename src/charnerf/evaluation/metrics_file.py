@@ -1,103 +1,100 @@
-"""The content of metrics.json and views.csv from what an evaluation collected, and the files themselves."""
+"""The content of metrics.json and views.csv from the results of characters, and the files themselves."""
 
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, final
+from statistics import median
+from typing import Any
 
 import torch
 
-from charnerf.evaluation.angles import by_azimuth, by_elevation, by_source_angle
+from charnerf.evaluation.angles import ANGLE_KEYS, by_azimuth, by_elevation, by_source_angle
+from charnerf.evaluation.character import OURS, CharacterResult
 from charnerf.evaluation.environment import environment
-from charnerf.evaluation.scores import ANGLE_KEYS, VIEW_KEYS, CharacterScores, summarize
-from charnerf.evaluation.timing import Stopwatch, process_peak_mib
+from charnerf.evaluation.scores import VIEW_KEYS, summarize
+from charnerf.evaluation.timing import process_peak_mib
 from charnerf.files import write_text
 from charnerf.types import LeftOut
 
 VIEWS_FILE = "views.csv"
 
 
-@final
-class Collected:
-    """What is collected while characters pass by.
-
-    Attributes:
-        watch: Seconds and memory of the stages.
-        left_out: Work that was not done, summed.
-        nearest: By character, the training character that the baseline `nearest` took, and how well it fits.
-        scores: By method ("ours" and the baselines), then by character.
-    """
-
-    def __init__(self, device: torch.device, methods: Sequence[str]) -> None:
-        self.watch = Stopwatch(device)
-        self.left_out = LeftOut()
-        self.nearest: dict[str, dict[str, Any]] = {}
-        self.scores: dict[str, dict[str, CharacterScores]] = {method: {} for method in methods}
-
-
-def collected_metrics(
-    state: Collected, names: Sequence[str], *, split: str, train_seconds: float | None
+def split_metrics(
+    results: Sequence[CharacterResult], *, split: str, device: torch.device, train_seconds: float | None
 ) -> dict[str, Any]:
-    """All numbers in the form of metrics.json."""
-    ours = [state.scores["ours"][name] for name in names]
+    """All numbers of a split in the form of metrics.json."""
+    ours = [result.scores[OURS] for result in results]
     views = [scores.views for scores in ours]
     return {
         "split": split,
-        "num_characters": len(names),
-        "num_views": sum(len(found) for found in views),
+        "num_characters": len(results),
+        "num_views": sum(map(len, views)),
         **summarize(ours),
         "by_azimuth": by_azimuth(views, VIEW_KEYS),
         "by_elevation": by_elevation(views, VIEW_KEYS),
         "by_source_angle": by_source_angle(views, VIEW_KEYS),
         "per_character": {
-            name: {"num_views": len(scores.views), **summarize([scores])}
-            for name, scores in zip(names, ours, strict=True)
+            result.name: {"num_views": len(result.frames), **summarize([scores])}
+            for result, scores in zip(results, ours, strict=True)
         },
-        "baselines": _baselines(state, names),
-        "seconds": _seconds(state.watch, train_seconds),
-        **_memory(state.watch),
-        "left_out": _left_out(state.left_out),
-        "environment": environment(state.watch.device),
+        "baselines": _baselines(results),
+        "seconds": _seconds(results, train_seconds),
+        **_memory(results, device),
+        "left_out": _left_out(sum((result.left_out for result in results), LeftOut())),
+        "environment": environment(device),
     }
 
 
-def _baselines(state: Collected, names: Sequence[str]) -> dict[str, Any]:
+def _baselines(results: Sequence[CharacterResult]) -> dict[str, Any]:
     """Every metric of the baselines; the hull's seconds, and which training characters were nearest."""
     found: dict[str, Any] = {}
-    for method, by_name in state.scores.items():
-        if method != "ours":
-            scores = [by_name[name] for name in names]
-            found[method] = summarize(scores)
-            found[method]["by_azimuth"] = by_azimuth([each.views for each in scores], VIEW_KEYS)
+    for method in results[0].scores:
+        if method != OURS:
+            scores = [result.scores[method] for result in results]
+            by_angle = by_azimuth([each.views for each in scores], VIEW_KEYS)
+            found[method] = {**summarize(scores), "by_azimuth": by_angle}
     if "nearest" in found:
-        found["nearest"]["found"] = state.nearest
+        found["nearest"]["found"] = {
+            result.name: {"character": near.name, "silhouette_iou_of_sources": near.iou}
+            for result in results
+            if (near := result.nearest) is not None
+        }
     if "visual_hull" in found:
         found["visual_hull"]["seconds"] = {
-            "encode": state.watch.median_seconds("hull_encode"),
-            "render_per_frame": state.watch.median_seconds("hull_render"),
+            "encode": _median_seconds(results, "hull_encode"),
+            "render_per_frame": _median_seconds(results, "hull_render"),
         }
     return found
 
 
-def _seconds(watch: Stopwatch, train_seconds: float | None) -> dict[str, Any]:
+def _seconds(results: Sequence[CharacterResult], train_seconds: float | None) -> dict[str, Any]:
     """Median seconds of the stages, null with the reason where one did not run."""
     seconds: dict[str, Any] = {"train": train_seconds}
     if train_seconds is None:
         seconds["train_reason"] = "the training time of these weights is not known here"
-    seconds["encode"] = watch.median_seconds("encode")
-    seconds["render_per_frame"] = watch.median_seconds("render")
-    seconds["mesh"] = watch.median_seconds("mesh")
+    seconds["encode"] = _median_seconds(results, "encode")
+    seconds["render_per_frame"] = _median_seconds(results, "render")
+    seconds["mesh"] = _median_seconds(results, "mesh")
     if seconds["mesh"] is None:
         seconds["mesh_reason"] = "no mesh was made"
     return seconds
 
 
-def _memory(watch: Stopwatch) -> dict[str, Any]:
+def _median_seconds(results: Sequence[CharacterResult], stage: str) -> float | None:
+    """Median over the executions of a stage; None if it never ran."""
+    seconds = [one for result in results for one in result.seconds.get(stage, ())]
+    return median(seconds) if seconds else None
+
+
+def _memory(results: Sequence[CharacterResult], device: torch.device) -> dict[str, Any]:
     """Peak memory of all, and of each stage of ours, MiB."""
-    peaks = watch.peaks_mib()
-    whole = max(peaks.values(), default=0.0) if watch.device.type == "cuda" else process_peak_mib()
+    peaks: dict[str, float] = {}
+    for result in results:
+        for stage, peak in result.peaks_mib.items():
+            peaks[stage] = max(peaks.get(stage, 0.0), peak)
+    whole = max(peaks.values(), default=0.0) if device.type == "cuda" else process_peak_mib()
     stages = {stage: peaks[stage] for stage in ("encode", "render", "mesh") if stage in peaks}
     return {"peak_memory_mib": whole, "peak_memory_by_stage_mib": stages}
 
@@ -112,8 +109,8 @@ def _left_out(left_out: LeftOut) -> dict[str, Any]:
     }
 
 
-def write_metrics(path: str | Path, metrics: dict[str, Any]) -> None:
-    """Write metrics.json in one step: a reader finds the old file or the whole new one.
+def write_metrics(path: str | Path, metrics: Mapping[str, Any]) -> None:
+    """Write metrics.json, whole or not at all.
 
     Raises:
         ValueError: If a number is NaN or infinite, which JSON can not say.
@@ -121,14 +118,14 @@ def write_metrics(path: str | Path, metrics: dict[str, Any]) -> None:
     write_text(Path(path), json.dumps(metrics, indent=2, allow_nan=False) + "\n")
 
 
-def write_views(path: Path, state: Collected) -> None:
+def write_views(path: Path, results: Sequence[CharacterResult]) -> None:
     """Write views.csv: a row for every method, character and view, empty cells where a metric could not be had."""
     text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(("method", "character", "view", *ANGLE_KEYS, *VIEW_KEYS))
-    for method, by_name in state.scores.items():
-        for name, scores in by_name.items():
-            for frame, record in zip(scores.frames, scores.views, strict=True):
-                table.writerow((method, name, frame, *(record[key] for key in (*ANGLE_KEYS, *VIEW_KEYS))))
-    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = csv.writer(text, lineterminator="\n")
+    keys = (*ANGLE_KEYS, *VIEW_KEYS)
+    rows.writerow(("method", "character", "view", *keys))
+    for method in results[0].scores:
+        for result in results:
+            for frame, record in zip(result.frames, result.scores[method].views, strict=False):
+                rows.writerow((method, result.name, frame, *(record[key] for key in keys)))
     write_text(path, text.getvalue())

@@ -25,6 +25,25 @@ def save_prediction(path: Path, prediction: RenderOutput) -> None:
     save_png(path, Image.fromarray(to_bytes(torch.cat((straight, alpha), dim=-1))))
 
 
+def save_pictures(
+    folder: Path,
+    character: Character,
+    frames: Sequence[int],
+    pictures: Mapping[str, Sequence[RenderOutput]],
+) -> None:
+    """Write the predictions of one character, named as in its data set, and its contact sheet, sheet.png.
+
+    Args:
+        folder: Of the character's pictures.
+        character: The character.
+        frames: Its evaluated frames (n).
+        pictures: Predictions (n) by method; "ours" and perhaps "visual_hull", "nearest".
+    """
+    for index, picture in zip(frames, pictures["ours"], strict=True):
+        save_prediction(folder / f"{character.image_files[index].stem}.png", picture)
+    save_sheet(folder / "sheet.png", character, frames, pictures)
+
+
 def depth_picture(prediction: RenderOutput) -> Tensor:
     """Depth (H, W) as grey (H, W, 3): near is dark, far light, nothing white."""
     seen = prediction.opacity > 0.5
@@ -56,25 +75,16 @@ def _panels(
 def save_sheet(
     path: Path,
     character: Character,
-    indices: Sequence[int],
-    images: Tensor,
-    drawn: Mapping[str, Sequence[RenderOutput]],
+    frames: Sequence[int],
+    pictures: Mapping[str, Sequence[RenderOutput]],
 ) -> None:
-    """Write a character's contact sheet: its drawings, then truth, prediction, hull, opacity and depth.
-
-    Args:
-        path: PNG file.
-        character: The character.
-        indices: Its evaluated frames (n).
-        images: Their true pictures, bytes (n, H, W, 4).
-        drawn: Predictions (n) by method; "ours" and perhaps "visual_hull", "nearest".
-    """
-    angles = view_angles(character.cameras[list(indices)], character.sources)
+    """Write a character's contact sheet: its drawings, then truth, prediction, hull, opacity and depth."""
+    angles = view_angles(character.cameras[list(frames)], character.sources)
     order = torch.argsort(angles.azimuth_deg).tolist()
     count = min(_SHEET_COLUMNS, len(order))
     chosen = [order[round(step * (len(order) - 1) / max(count - 1, 1))] for step in range(count)]
     width, height = character.cameras.width, character.cameras.height
-    rows = _panels(chosen, images, drawn)
+    rows = _panels(chosen, character.images(frames), pictures)
     columns = max(count, len(character.source_names))
     size = (_LABEL_WIDTH + columns * width, (len(rows) + 1) * height + 2 * _HEADER)
     sheet = Image.new("RGB", size, "white")
@@ -90,9 +100,9 @@ def save_sheet(
         azimuth, elevation = float(angles.azimuth_deg[place]), float(angles.elevation_deg[place])
         label = f"{azimuth:.0f}°, up {elevation:.0f}°"
         pen.text((_LABEL_WIDTH + column * width + 4, top + 1), label, _INK, font)
-    for row, (label, pictures) in enumerate(rows):
+    for row, (label, panels) in enumerate(rows):
         y = top + _HEADER + row * height
         pen.text((4, y + height // 2), label, _INK, font)
-        for column, picture in enumerate(pictures):
+        for column, picture in enumerate(panels):
             sheet.paste(Image.fromarray(to_bytes(picture)), (_LABEL_WIDTH + column * width, y))
     save_png(path, sheet)

@@ -17,7 +17,7 @@ from torch import Tensor
 from charnerf.data.characters import Character
 from charnerf.data.layout import read_json
 from charnerf.errors import DataError
-from charnerf.evaluation.evaluate import fixed_views
+from charnerf.evaluation.frames import fixed_views
 from charnerf.files import write_text
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import may_hold

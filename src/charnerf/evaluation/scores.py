@@ -1,7 +1,7 @@
 """Every metric of one view, and their means with the reasons for what is missing."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -14,26 +14,28 @@ from charnerf.pictures import on_white
 from charnerf.types import RenderOutput
 
 VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou")
-ANGLE_KEYS = ("azimuth_deg", "elevation_deg", "source_angle_deg")
 SURFACE_KEYS = ("chamfer_mm", "f_score")
 METRIC_KEYS = VIEW_KEYS + SURFACE_KEYS
 
 
-@dataclass
-class CharacterScores:
+@dataclass(frozen=True)
+class MethodScores:
     """One method on one character.
 
     Attributes:
-        views: A record a view: VIEW_KEYS, azimuth_deg, elevation_deg, source_angle_deg.
-        frames: Name of each view's picture in the data set.
+        views: A record a view: VIEW_KEYS and ANGLE_KEYS.
         surface: SURFACE_KEYS.
         reasons: Why a key is missing.
     """
 
-    views: list[Record] = field(default_factory=list)
-    frames: list[str] = field(default_factory=list)
-    surface: dict[str, float | None] = field(default_factory=dict)
-    reasons: dict[str, str] = field(default_factory=dict)
+    views: Sequence[Record]
+    surface: Mapping[str, float | None]
+    reasons: Mapping[str, str]
+
+
+def missing_scores(reason: str) -> MethodScores:
+    """The scores of a method that could not be had."""
+    return MethodScores(views=(), surface={}, reasons=dict.fromkeys(METRIC_KEYS, reason))
 
 
 def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
@@ -48,8 +50,15 @@ def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
     return RenderOutput(moved.rgb.clamp(0.0, 1.0), moved.opacity.clamp(0.0, 1.0), moved.depth)
 
 
-def score_view(prediction: RenderOutput, image: Tensor, angles: Record, *, reasons: dict[str, str]) -> Record:
-    """All metrics of a prediction against the true bytes (H, W, 4); notes in `reasons` why one is missing."""
+def score_views(
+    predictions: Sequence[RenderOutput], images: Tensor
+) -> tuple[list[dict[str, float | None]], dict[str, str]]:
+    """VIEW_KEYS of predictions against the true bytes (n, H, W, 4), and why a key is missing."""
+    reasons: dict[str, str] = {}
+    return [_score_view(*pair, reasons) for pair in zip(predictions, images, strict=True)], reasons
+
+
+def _score_view(prediction: RenderOutput, image: Tensor, reasons: dict[str, str]) -> dict[str, float | None]:
     rgba = image.float() / 255.0
     truth, alpha = on_white(rgba), rgba[..., 3]
     perceptual, why = metrics.lpips(prediction.rgb, truth)
@@ -65,11 +74,10 @@ def score_view(prediction: RenderOutput, image: Tensor, angles: Record, *, reaso
         "lpips": perceptual,
         "flip": metrics.flip(prediction.rgb, truth),
         "silhouette_iou": metrics.silhouette_iou(prediction.opacity, alpha),
-        **angles,
     }
 
 
-def summarize(characters: Sequence[CharacterScores]) -> dict[str, Any]:
+def summarize(characters: Sequence[MethodScores]) -> dict[str, Any]:
     """Means over a character's views, then over characters; null with `<key>_reason` where there is none."""
     found: dict[str, Any] = mean_over_characters([scores.views for scores in characters], VIEW_KEYS)
     found |= mean_of([scores.surface for scores in characters], SURFACE_KEYS)

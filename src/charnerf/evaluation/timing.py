@@ -1,4 +1,4 @@
-"""Seconds and memory of the stages: devices are synchronised, figures are medians."""
+"""Seconds and memory of the stages: devices are synchronised."""
 
 import os
 import resource
@@ -9,7 +9,6 @@ from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from statistics import median
 from types import TracebackType
 from typing import Self, final
 
@@ -86,9 +85,9 @@ class Stopwatch:
         finally:
             self._stage = None
 
-    def median_seconds(self, name: str) -> float | None:
-        """Median over the executions of a stage; None if it never ran."""
-        return median(self._seconds[name]) if self._seconds.get(name) else None
+    def seconds(self) -> dict[str, list[float]]:
+        """Of every execution of each stage, in order."""
+        return {name: list(seconds) for name, seconds in self._seconds.items()}
 
     def total_seconds(self, name: str) -> float:
         """Sum over the executions of a stage."""

@@ -137,6 +137,11 @@ class AnySize:
     network: CharNeRF
     width: int
 
+    @property
+    def device(self) -> torch.device:
+        """Where the network is."""
+        return self.network.device
+
     def encode(self, views: SourceViews) -> EncodedViews:
         """Encode views at the encoder's width."""
         views, detailed = fitted(views, self.width)

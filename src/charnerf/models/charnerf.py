@@ -85,6 +85,11 @@ class CharNeRF(nn.Module):
         self.has_hull = hull
 
     @property
+    def device(self) -> torch.device:
+        """Where the networks are."""
+        return self.box_centre.device
+
+    @property
     def box(self) -> tuple[Tensor, Tensor]:
         """Lower and upper corner of the space looked at, (3,) each, m."""
         return self.box_centre - self.box_half_extent, self.box_centre + self.box_half_extent

@@ -49,7 +49,6 @@ def finish_run(
         train_seconds: Training time, evaluation excluded.
         trainer: Its logger gets the mesh.
     """
-    device = next(model.parameters()).device
 
     def make_mesh(scene: Scene, views: SourceViews) -> BuiltMesh:
         return build_mesh(scene, views, resolution=cfg.scale.mesh_resolution)
@@ -62,8 +61,7 @@ def finish_run(
         views=cfg.scale.eval_views or "all",
         output=folder,
         mesh=make_mesh,
-        device=device,
-        nearest=TrainingCharacters([(root, split) for split in cfg.splits.train]),
+        training=TrainingCharacters([(root, split) for split in cfg.splits.train]),
         train_seconds=train_seconds,
     )
     size = sum(parameter.numel() for parameter in model.parameters())

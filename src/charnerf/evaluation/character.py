@@ -1,0 +1,186 @@
+"""One character measured: a model's pictures and mesh, beside those that a user has without learning."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+import trimesh
+
+from charnerf.data.characters import Character
+from charnerf.errors import CharNeRFError
+from charnerf.evaluation.angles import view_angles
+from charnerf.evaluation.baselines import VisualHullBaseline, white_prediction
+from charnerf.evaluation.nearest import (
+    NO_MATCH,
+    NO_TRAINING_SET,
+    Nearest,
+    NearestBaseline,
+    TrainingCharacters,
+)
+from charnerf.evaluation.scores import MethodScores, missing_scores, score_views, to_cpu
+from charnerf.evaluation.surface_error import missing_surface, surface_scores, true_points
+from charnerf.evaluation.timing import Stopwatch
+from charnerf.meshing.build import BuiltMesh
+from charnerf.models.charnerf import CharNeRF
+from charnerf.types import LeftOut, RenderOutput, Scene, SourceViews
+from charnerf.volume.renderers.base import AbstractRenderer
+
+OURS = "ours"
+BASELINES = ("white", "visual_hull", "nearest")
+MakeMesh = Callable[[Scene, SourceViews], BuiltMesh]
+"""From a scene and its drawings (B = 1) to its mesh."""
+
+
+@dataclass(frozen=True)
+class CharacterResult:
+    """What was measured on one character.
+
+    Attributes:
+        name: Of the character.
+        frames: Names of the pictures that were measured (n), as in the data set.
+        scores: By method, "ours" and the baselines.
+        pictures: Predictions (n), fields (H, W) on the CPU, of every method that draws.
+        left_out: Work that was not done for ours.
+        nearest: The training character that the baseline `nearest` took; None where it took none.
+        seconds: Of every execution of a stage: encode, render, mesh; hull_encode, hull_render.
+        peaks_mib: Most memory that was held while a stage ran.
+    """
+
+    name: str
+    frames: Sequence[str]
+    scores: Mapping[str, MethodScores]
+    pictures: Mapping[str, Sequence[RenderOutput]]
+    left_out: LeftOut
+    nearest: Nearest | None
+    seconds: Mapping[str, Sequence[float]]
+    peaks_mib: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What a method makes of a character's drawings: a picture a frame, and a mesh or why there is none."""
+
+    pictures: Sequence[RenderOutput]
+    surface: trimesh.Trimesh | str | None
+    left_out: LeftOut = field(default_factory=LeftOut)
+
+
+def measure_character(
+    network: CharNeRF,
+    renderer: AbstractRenderer,
+    character: Character,
+    frames: Sequence[int],
+    *,
+    mesh: MakeMesh | None = None,
+    baselines: bool = True,
+    training: TrainingCharacters | None = None,
+    on_picture: Callable[[], object] = lambda: None,
+) -> CharacterResult:
+    """Measure a model on a character: every metric of every frame, of the surface, seconds and memory.
+
+    Args:
+        network: In eval mode.
+        renderer: Draws its scenes.
+        character: With its drawings and true pictures.
+        frames: Indices of the pictures to measure, as from `fixed_views`.
+        mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them out.
+        baselines: Whether to measure `white`, `visual_hull` and `nearest` too.
+        training: Characters that the model was trained on, for the baseline `nearest`; None leaves it out.
+        on_picture: Called after every picture of ours.
+
+    Raises:
+        NumericalError: If a prediction is not finite; the message names the picture.
+    """
+    nearest = training.nearest(character) if baselines and training is not None else None
+    with Stopwatch(network.device) as watch:
+        answers = {OURS: _ours(network, renderer, character, frames, mesh, watch, on_picture)}
+        if baselines:
+            answers["white"] = _white(character, frames)
+            answers["visual_hull"] = _visual_hull(character, frames, watch)
+        if nearest is not None:
+            answers["nearest"] = _nearest(nearest, character, frames)
+    truth = None if character.mesh_file is None else true_points(character.mesh_file)
+    images = character.images(frames)
+    angles = view_angles(character.cameras[list(frames)], character.sources).records()
+    scores = {}
+    for method, answer in answers.items():
+        views, reasons = score_views(answer.pictures, images)
+        views = [{**metrics, **angle} for metrics, angle in zip(views, angles, strict=True)]
+        surface, missing = _surface_scores(answer.surface, truth, character)
+        scores[method] = MethodScores(views, surface, {**reasons, **missing})
+    if baselines and nearest is None:
+        scores["nearest"] = missing_scores(NO_TRAINING_SET if training is None else NO_MATCH)
+    return CharacterResult(
+        name=character.name,
+        frames=[character.image_files[index].stem for index in frames],
+        scores=scores,
+        pictures={method: answer.pictures for method, answer in answers.items()},
+        left_out=answers[OURS].left_out,
+        nearest=nearest,
+        seconds=watch.seconds(),
+        peaks_mib=watch.peaks_mib(),
+    )
+
+
+@torch.no_grad()
+def _ours(
+    network: CharNeRF,
+    renderer: AbstractRenderer,
+    character: Character,
+    frames: Sequence[int],
+    mesh: MakeMesh | None,
+    watch: Stopwatch,
+    on_picture: Callable[[], object],
+) -> _Answer:
+    """The model's pictures and mesh."""
+    sources = character.sources.to(watch.device)
+    with watch.stage("encode"):
+        scene = network.scene(network.encode(sources), 0)
+    pictures, left_out = [], LeftOut()
+    for index in frames:
+        camera = character.cameras[index].to(watch.device)
+        with watch.stage("render"):
+            rendering = renderer.render_camera(scene, camera)
+        pictures.append(to_cpu(rendering.finest, name=f"{character.name}, view {index}"))
+        left_out += rendering.left_out
+        on_picture()
+    if mesh is None:
+        return _Answer(pictures, "no mesh was made", left_out)
+    try:
+        with watch.stage("mesh"):
+            built = mesh(scene, sources)
+    except CharNeRFError as error:
+        return _Answer(pictures, str(error), left_out)
+    return _Answer(pictures, built.mesh, left_out + built.left_out)
+
+
+def _white(character: Character, frames: Sequence[int]) -> _Answer:
+    pictures = [white_prediction(character.cameras[index]) for index in frames]
+    return _Answer(pictures, "the white picture has no surface")
+
+
+def _visual_hull(character: Character, frames: Sequence[int], watch: Stopwatch) -> _Answer:
+    with watch.stage("hull_encode"):
+        hull = VisualHullBaseline(character.sources)
+    pictures = []
+    for index in frames:
+        with watch.stage("hull_render"):
+            pictures.append(hull.render(character.cameras[index]))
+    return _Answer(pictures, hull.mesh)
+
+
+def _nearest(nearest: Nearest, character: Character, frames: Sequence[int]) -> _Answer:
+    drawn = NearestBaseline(nearest, character.sources)
+    return _Answer([drawn.render(character.cameras[index]) for index in frames], nearest.mesh)
+
+
+def _surface_scores(
+    surface: trimesh.Trimesh | str | None, truth: np.ndarray | None, character: Character
+) -> tuple[dict[str, float | None], dict[str, str]]:
+    """Chamfer and F-score, or None with the reasons."""
+    if truth is None:
+        return missing_surface("the data set has no mesh of the character")
+    if isinstance(surface, str):
+        return missing_surface(surface)
+    return surface_scores(surface, truth, character.cameras)
