@@ -10,16 +10,15 @@ from torch import Tensor
 
 from charnerf.data.characters import CharacterPictures, write_character
 from charnerf.data.layout import add_to_split
+from charnerf.geometry import framing
 from charnerf.geometry.cameras import (
-    cameras_towards,
-    direction_from_angles,
     fibonacci_hemisphere,
     pixel_centres,
     pixel_rays,
 )
+from charnerf.geometry.framing import CENTRE, framing_cameras
 from charnerf.types import Cameras, RayBundle, SourceViews
 
-CENTRE = (0.0, 0.0, 1.0)
 HALF_EXTENT = 1.15
 SIZE = 32
 OVERSAMPLING = 4
@@ -148,27 +147,13 @@ def source_cameras(
     azimuths: tuple[float, ...] = (0.0, 90.0, 180.0), *, size: int = SIZE, orthographic: bool = True
 ) -> Cameras:
     """Level cameras (V,) around the character, float32."""
-    angles = torch.tensor(azimuths, dtype=torch.float64)
-    return cameras_towards(
-        direction_from_angles(angles, torch.zeros_like(angles)),
-        target=torch.tensor(CENTRE, dtype=torch.float64),
-        distance=4.0,
-        half_extent=HALF_EXTENT,
-        size=size,
-        orthographic=orthographic,
-    ).to(torch.float32)
+    cameras = framing.source_cameras(azimuths, radius=HALF_EXTENT, size=size, orthographic=orthographic)
+    return cameras.to(torch.float32)
 
 
 def target_cameras(count: int, *, size: int = SIZE) -> Cameras:
     """Pinholes (count,) on the upper hemisphere, float32."""
-    return cameras_towards(
-        fibonacci_hemisphere(count),
-        target=torch.tensor(CENTRE, dtype=torch.float64),
-        distance=4.0,
-        half_extent=HALF_EXTENT,
-        size=size,
-        orthographic=False,
-    ).to(torch.float32)
+    return framing_cameras(fibonacci_hemisphere(count), radius=HALF_EXTENT, size=size).to(torch.float32)
 
 
 def source_views(figure: Figure, cameras: Cameras | None = None) -> SourceViews:

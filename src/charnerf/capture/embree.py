@@ -11,22 +11,15 @@ import trimesh
 from scipy import ndimage
 
 from charnerf.capture.lights import AbstractLight, Unlit
-from charnerf.data.characters import SOURCE_ORDER, CharacterPictures
+from charnerf.data.characters import CharacterPictures
 from charnerf.errors import ConfigError
-from charnerf.geometry.cameras import (
-    cameras_towards,
-    direction_from_angles,
-    fibonacci_hemisphere,
-    project,
-)
+from charnerf.geometry.cameras import fibonacci_hemisphere, project
+from charnerf.geometry.framing import CENTRE, SOURCE_ORDER, framing_cameras, source_cameras
 from charnerf.surfaces.color import srgb_from_linear
 from charnerf.surfaces.raycast import Hits, RayCaster
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import SurfaceMesh, shade, texture_levels, triangle_normals
 from charnerf.types import Cameras
-
-CENTRE = (0.0, 0.0, 1.0)
-SOURCE_AZIMUTHS = {"front": 0.0, "side": 90.0, "back": 180.0}
 
 
 @dataclass(frozen=True)
@@ -88,7 +81,9 @@ def capture_character(
         DataError: If the scene has no triangles.
     """
     surface = scene if isinstance(scene, SurfaceMesh) else surface_of_scene(scene)
-    targets, sources = framing_cameras(surface, options)
+    radius, size = surface.framing_radius, options.size
+    targets = framing_cameras(fibonacci_hemisphere(options.views), radius=radius, size=size)
+    sources = source_cameras(radius=radius, size=size, orthographic=options.sources == "orthographic")
     studio = _Studio(surface, options)
     shots = [studio.shoot(camera) for camera in _each(targets)]
     source_shots = [studio.shoot(camera) for camera in _each(sources)]
@@ -105,42 +100,15 @@ def capture_character(
 
 def capture_sources(surface: SurfaceMesh, size: int) -> np.ndarray:
     """Orthographic source views of a surface, front, side and back, RGBA uint8 (3, size, size, 4)."""
-    options = CaptureOptions(views=1, size=size)
-    studio = _Studio(surface, options)
-    return np.stack([studio.shoot(camera).rgba for camera in _each(framing_cameras(surface, options)[1])])
+    studio = _Studio(surface, CaptureOptions())
+    cameras = source_cameras(radius=surface.framing_radius, size=size)
+    return np.stack([studio.shoot(camera).rgba for camera in _each(cameras)])
 
 
 def _each(cameras: Cameras) -> Iterator[Cameras]:
     """One camera of shape () after the other, float32 as Embree's rays are."""
     for index in range(len(cameras.orthographic)):
         yield cameras[index].to(dtype=torch.float32)
-
-
-def framing_cameras(surface: SurfaceMesh, options: CaptureOptions) -> tuple[Cameras, Cameras]:
-    """Target cameras (views,) and source cameras (3,) that frame the whole surface."""
-    centre = torch.tensor(CENTRE, dtype=torch.float64)
-    reach = float(np.linalg.norm(surface.triangles.reshape(-1, 3) - np.array(CENTRE), axis=-1).max())
-    half_extent = max(1.0, 1.05 * reach)
-    distance = max(4.0, 2.5 * half_extent)
-    azimuths = torch.tensor([SOURCE_AZIMUTHS[name] for name in SOURCE_ORDER], dtype=torch.float64)
-    towards_sources = direction_from_angles(azimuths, torch.zeros_like(azimuths))
-    targets = cameras_towards(
-        fibonacci_hemisphere(options.views),
-        target=centre,
-        distance=distance,
-        half_extent=half_extent,
-        size=options.size,
-        orthographic=False,
-    )
-    sources = cameras_towards(
-        towards_sources,
-        target=centre,
-        distance=distance,
-        half_extent=half_extent,
-        size=options.size,
-        orthographic=options.sources == "orthographic",
-    )
-    return targets, sources
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import numpy as np
 import trimesh
 
 from charnerf.errors import ConfigError, DataError
+from charnerf.geometry.framing import HEIGHT
 from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
 
-HEIGHT = 2.0
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 _DEFAULT_AXES = {
     ".glb": ("y", "+z"),

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from charnerf.capture.meshes import HEIGHT
 from charnerf.errors import DataError
+from charnerf.geometry.framing import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, triangle_areas
 
 ROWS, COLUMNS = 80, 80

@@ -14,9 +14,9 @@ from torch import Tensor
 from charnerf.data.layout import MESH_FILE, TRANSFORMS_FILE, check_name
 from charnerf.data.transforms import read_transforms, transforms_text
 from charnerf.errors import DataError
+from charnerf.geometry.framing import SOURCE_ORDER
 from charnerf.types import Cameras, SourceViews
 
-SOURCE_ORDER = ("front", "side", "back")
 DEPTH_FOLDER = "depth"
 _PARTIAL = ".partial-"
 

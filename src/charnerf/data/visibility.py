@@ -8,7 +8,8 @@ import torch
 
 from charnerf.data.layout import TRANSFORMS_FILE
 from charnerf.data.transforms import read_transforms
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles, fibonacci_hemisphere
+from charnerf.geometry.cameras import direction_from_angles, fibonacci_hemisphere
+from charnerf.geometry.framing import SOURCE_AZIMUTHS, framing_cameras
 from charnerf.surfaces.raycast import RayCaster
 from charnerf.surfaces.surface_mesh import SurfaceMesh, triangle_normals
 from charnerf.types import Cameras
@@ -61,18 +62,10 @@ def capture_cameras(mesh_file: Path) -> Cameras | None:
 
 def default_cameras(mesh: SurfaceMesh) -> Cameras:
     """Cameras (51,) as a capture sets them: a Fibonacci hemisphere and the three source views."""
-    centre = torch.tensor((0.0, 0.0, 1.0), dtype=torch.float64)
-    reach = float(np.linalg.norm(mesh.triangles.reshape(-1, 3) - centre.numpy(), axis=-1).max())
-    azimuths = torch.tensor((0.0, 90.0, 180.0), dtype=torch.float64)
+    azimuths = torch.tensor(tuple(SOURCE_AZIMUTHS.values()), dtype=torch.float64)
     level = direction_from_angles(azimuths, torch.zeros_like(azimuths))
-    return cameras_towards(
-        torch.cat((fibonacci_hemisphere(48), level)),
-        target=centre,
-        distance=max(4.0, 2.5 * reach),
-        half_extent=max(1.0, 1.05 * reach),
-        size=128,
-        orthographic=False,
-    )
+    directions = torch.cat((fibonacci_hemisphere(48), level))
+    return framing_cameras(directions, radius=mesh.framing_radius, size=128)
 
 
 def _rays_to(camera: Cameras, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,10 +10,7 @@ import numpy as np
 from PIL import Image
 
 from charnerf.errors import DataError
-
-HEIGHT = 2.0  # metres from floor line to crown
-MARGIN = 1.05  # as captures are framed: half extent over the greatest distance from (0, 0, 1)
-LEAST_EXTENT = 1.0  # metres
+from charnerf.geometry.framing import HEIGHT, framing_radius
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ def half_extent(figures: list[tuple[np.ndarray, FigureBox]]) -> float:
     The greatest distance from the character's middle to any covered pixel of any view, with the captures'
     margin.
     """
-    reach = LEAST_EXTENT
+    reach = 0.0
     for alpha, box in figures:
         metres = HEIGHT / box.height
         rows, columns = np.nonzero(alpha > 0.5)
@@ -67,7 +64,7 @@ def half_extent(figures: list[tuple[np.ndarray, FigureBox]]) -> float:
         up = box.bottom - (rows + 0.5)
         from_middle = np.hypot(across * metres, up * metres - 0.5 * HEIGHT)
         reach = max(reach, float(from_middle.max()))
-    return MARGIN * reach
+    return framing_radius(reach)
 
 
 def place(rgba: np.ndarray, box: FigureBox, *, extent: float, size: int) -> np.ndarray:

@@ -8,8 +8,9 @@ import torch
 from PIL import Image
 
 from charnerf.capture.embree import capture_sources
-from charnerf.data.characters import SOURCE_ORDER, Character
+from charnerf.data.characters import Character
 from charnerf.data.drawing_style import draw_pictures, random_style
+from charnerf.geometry.framing import SOURCE_ORDER
 from charnerf.pictures import save_png
 from charnerf.surfaces.mesh_files import load_surface_mesh
 

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 
-from charnerf.drawings.align import HEIGHT
+from charnerf.geometry.framing import HEIGHT
 
 PANEL = 320  # pixels a side
 CAPTION = 40

@@ -6,18 +6,17 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from charnerf.drawings.align import HEIGHT, FigureBox, figure_box, half_extent, place
+from charnerf.drawings.align import FigureBox, figure_box, half_extent, place
 from charnerf.drawings.cutout import Cutout, cut_out
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.picture import draw_assumptions
 from charnerf.errors import DataError
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles
-from charnerf.types import Cameras, SourceViews
+from charnerf.geometry.framing import HEIGHT, SOURCE_AZIMUTHS, source_cameras
+from charnerf.types import SourceViews
 
 SIDES = {"left": 90.0, "right": 270.0}  # azimuth of the camera that a side drawing stands for
 LEAST_AGREEMENT = 0.85  # IoU of the back's silhouette with the mirrored front's
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
-DISTANCE = 4.0  # metres, of the cameras, or more where the canvas is large
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def read_turnaround(
     figures = [_prepare(view, source) for view, source in given.items()]
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
     canvases = _canvases(figures, extent, size)
-    azimuths = [0.0, SIDES[side_is], 180.0]
+    azimuths = [*{**SOURCE_AZIMUTHS, "side": SIDES[side_is]}.values()]
     assumptions, warnings = _told(figures, extent, size, side_is)
     warnings += _check_back(canvases[0][..., 3], canvases[2][..., 3], figures[2].drawing.name)
     finest = max(round(2.0 * extent * figure.box.height / HEIGHT) for figure in figures)
@@ -112,22 +111,8 @@ def _source_views(canvases: list[np.ndarray], azimuths_deg: list[float], extent:
     """Canvases with their cameras, B = 1."""
     flags = torch.zeros(1, len(canvases), dtype=torch.bool)
     images = torch.from_numpy(np.stack(canvases)).permute(0, 3, 1, 2)[None].contiguous()
-    cameras = source_cameras(azimuths_deg, extent, images.shape[-1])
-    return SourceViews(images=images, cameras=cameras, present=~flags, mirrored=flags.clone())
-
-
-def source_cameras(azimuths_deg: list[float], extent: float, size: int) -> Cameras:
-    """Orthographic cameras of shape (1, V) at elevation 0 around (0, 0, 1), framed as captures are."""
-    azimuths = torch.tensor(azimuths_deg, dtype=torch.float64)
-    cameras = cameras_towards(
-        direction_from_angles(azimuths, torch.zeros_like(azimuths)),
-        target=torch.tensor([0.0, 0.0, 0.5 * HEIGHT], dtype=torch.float64),
-        distance=max(DISTANCE, 2.5 * extent),
-        half_extent=extent,
-        size=size,
-        orthographic=True,
-    )
-    return cameras.to(torch.float32)[None]
+    cameras = source_cameras(azimuths_deg, radius=extent, size=images.shape[-1]).to(torch.float32)
+    return SourceViews(images=images, cameras=cameras[None], present=~flags, mirrored=flags.clone())
 
 
 def _prepare(view: str, source: str | Path | np.ndarray) -> _Figure:

@@ -18,7 +18,8 @@ from charnerf.data.characters import Character
 from charnerf.data.layout import read_json
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import write_text
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles, pixel_centres, pixel_rays
+from charnerf.geometry.cameras import direction_from_angles, pixel_centres, pixel_rays
+from charnerf.geometry.framing import framing_camera
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.combinators.base import masked_logits, view_weights
 from charnerf.models.combinators.view_attention import AttentionLogits, ViewAttention
@@ -27,7 +28,7 @@ from charnerf.types import Cameras, Scene
 ATTENTION_FILE = "attention.json"
 AZIMUTH_STEP_DEG = 5
 SIZE = 48  # pixels
-HALF_EXTENT, DISTANCE, HEIGHT = 1.4, 4.0, 1.0  # metres, of the cameras around (0, 0, HEIGHT)
+RADIUS = 1.4  # metres, that the cameras frame
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def attention_profile(
     scenes = [network.scene(network.encode(one.sources.to(device)), 0) for one in characters]
     found, count = [], 0
     for azimuth in azimuths:
-        camera = _camera(azimuth, size).to(device)
+        camera = framing_camera(azimuth, 0.0, radius=RADIUS, size=size).to(device)
         calls = [
             _seen(combinator, scene, renderer, camera, one.name)
             for scene, one in zip(scenes, characters, strict=True)
@@ -146,20 +147,6 @@ def attention_profile(
         view_factor=factor,
         num_points=count,
     )
-
-
-def _camera(azimuth_deg: float, size: int) -> Cameras:
-    """Camera of shape () at the height of the character's middle."""
-    angles = torch.tensor([azimuth_deg, 0.0], dtype=torch.float64)
-    cameras = cameras_towards(
-        direction_from_angles(angles[0], angles[1])[None],
-        target=torch.tensor([0.0, 0.0, HEIGHT], dtype=torch.float64),
-        distance=DISTANCE,
-        half_extent=HALF_EXTENT,
-        size=size,
-        orthographic=False,
-    )
-    return cameras.to(torch.float32)[0]
 
 
 def _seen(combinator: ViewAttention, scene: Scene, renderer: Any, camera: Cameras, name: str) -> _Call:

@@ -15,10 +15,9 @@ from torch import Tensor
 
 from charnerf.evaluation.projected import FAR, ProjectedMesh, look_up
 from charnerf.geometry.cameras import project
+from charnerf.geometry.framing import BOX_HALF_EXTENT, CENTRE
 from charnerf.types import Cameras, RenderOutput, SourceViews
 
-_BOX_CENTRE = (0.0, 0.0, 1.0)
-_BOX_HALF_EXTENT = 1.8
 _COARSE_CELL = 0.06
 _FINE_CELL = 0.012
 _MAX_CELLS = 3_000_000
@@ -86,9 +85,9 @@ def _grid_points(low: Tensor, cell: float, counts: tuple[int, int, int]) -> Tens
 
 def carve(cameras: Cameras, edge_distances: Tensor) -> trimesh.Trimesh | None:
     """Mesh of the visual hull of views (V,) with signed edge distances (V, H, W); None if it is empty."""
-    centre = torch.tensor(_BOX_CENTRE)
-    count = 1 + int(2 * _BOX_HALF_EXTENT / _COARSE_CELL)
-    coarse = _grid_points(centre - _BOX_HALF_EXTENT, _COARSE_CELL, (count, count, count))
+    centre = torch.tensor(CENTRE)
+    count = 1 + int(2 * BOX_HALF_EXTENT / _COARSE_CELL)
+    coarse = _grid_points(centre - BOX_HALF_EXTENT, _COARSE_CELL, (count, count, count))
     near = hull_field(cameras, edge_distances, coarse) > -_COARSE_CELL
     if not bool(near.any()):
         return None

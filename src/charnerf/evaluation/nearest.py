@@ -20,6 +20,7 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.baselines import used_drawings
 from charnerf.evaluation.projected import ProjectedMesh, look_up
 from charnerf.geometry.cameras import project
+from charnerf.geometry.framing import BOX_HALF_EXTENT, CENTRE
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.types import Cameras, RenderOutput, SourceViews
 
@@ -27,8 +28,6 @@ NO_TRAINING_SET = "no training characters were named; name them with --nearest-f
 NO_MATCH = "no training character has a mesh and was drawn from the same views"
 _GRID = 128
 """Side of the masks that are compared: pixels of 2.8 cm, whatever each character's own pictures frame."""
-_CENTRE = (0.0, 0.0, 1.0)
-_HALF_EXTENT = 1.8
 _POPCOUNT = np.array([value.bit_count() for value in range(256)], dtype=np.uint8)
 
 
@@ -153,13 +152,13 @@ def _packed_masks(sources: SourceViews) -> np.ndarray:
     Each view is sampled on the plane through the character's middle that faces its camera.
     """
     steps = (torch.arange(_GRID) + 0.5) / _GRID * 2.0 - 1.0
-    up, across = torch.meshgrid(_HALF_EXTENT * steps, _HALF_EXTENT * steps, indexing="ij")
+    up, across = torch.meshgrid(BOX_HALF_EXTENT * steps, BOX_HALF_EXTENT * steps, indexing="ij")
     offsets = torch.stack((across, up), dim=-1).reshape(-1, 2)
     rows = []
     for view in range(sources.images.shape[1]):
         camera = sources.cameras[0, view].to("cpu", torch.float32)
         axes = camera.world_from_camera[:3, :2]
-        pixels, _, _ = project(camera, torch.tensor(_CENTRE) + offsets @ axes.T)
+        pixels, _, _ = project(camera, torch.tensor(CENTRE) + offsets @ axes.T)
         alpha = look_up(sources.images[0, view, 3:], pixels)[:, 0]
         size = pixels.new_tensor((camera.width, camera.height))
         framed = ((pixels >= 0.0) & (pixels <= size)).all(dim=-1)

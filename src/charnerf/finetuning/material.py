@@ -16,6 +16,7 @@ from charnerf.geometry.cameras import (
     pixel_centres,
     pixel_rays,
 )
+from charnerf.geometry.framing import camera_distance
 from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.types import Cameras, LeftOut, RayBundle, Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -146,7 +147,7 @@ def _novel_cameras(scene: Scene, radius: float, generator: torch.Generator) -> t
     cameras = cameras_towards(
         direction_from_angles(azimuths, elevations),
         target=(0.5 * (scene.box_min + scene.box_max)).double().cpu(),
-        distance=max(4.0, 2.5 * radius),
+        distance=camera_distance(radius),
         half_extent=radius,
         size=NOVEL_SIZE,
         orthographic=False,

@@ -13,7 +13,7 @@ import torch
 
 from charnerf.drawings.turnaround import Turnaround, read_turnaround
 from charnerf.errors import ConfigError, ShapeError
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles
+from charnerf.geometry.framing import CENTRE, HEIGHT, framing_camera, framing_radius
 from charnerf.geometry.resizing import resized_views
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.lod import Lod, build_lods
@@ -26,10 +26,6 @@ from charnerf.volume.renderers.base import AbstractRenderer
 if TYPE_CHECKING:
     import trimesh
 
-HEIGHT = 2.0  # metres, of every character
-CENTRE = (0.0, 0.0, 0.5 * HEIGHT)
-LEAST_DISTANCE = 4.0  # metres, of a camera from the centre
-MARGIN = 1.05  # of a picture's half-extent over the character's radius
 Picture = str | Path | np.ndarray
 TextureKind = Literal["drawings", "field", "vertex"]
 
@@ -323,12 +319,10 @@ class Hero:
             return float((self.scene.box_max - box_min).amax()) / 2.0
         occupied = hull.occupancy.nonzero()
         if len(occupied) == 0:
-            return MARGIN
+            return framing_radius(0.0)
         cell = (hull.box_max - hull.box_min) / torch.tensor(hull.occupancy.shape, device=box_min.device)
         centres = hull.box_min + (occupied + 0.5) * cell
-        return MARGIN * max(
-            1.0, math.sqrt(float((centres - box_min.new_tensor(CENTRE)).square().sum(-1).max()))
-        )
+        return framing_radius(math.sqrt(float((centres - box_min.new_tensor(CENTRE)).square().sum(-1).max())))
 
     def _scene_for(self, size: int) -> Scene:
         """The scene for pictures of a size: a pixel of theirs covers as much as one of the drawings that it reads."""
@@ -342,14 +336,5 @@ class Hero:
 
     def _camera(self, azimuth_deg: float, elevation_deg: float, size: int) -> Cameras:
         """Pinhole camera of shape () that frames the character."""
-        device, radius = self.scene.box_min.device, self.radius()
-        angles = torch.tensor([azimuth_deg, elevation_deg], dtype=torch.float64, device=device)
-        camera = cameras_towards(
-            direction_from_angles(angles[0], angles[1])[None],
-            target=torch.tensor(CENTRE, dtype=torch.float64, device=device),
-            distance=max(LEAST_DISTANCE, 2.5 * radius),
-            half_extent=radius,
-            size=size,
-            orthographic=False,
-        )
-        return camera.to(torch.float32)[0]
+        camera = framing_camera(azimuth_deg, elevation_deg, radius=self.radius(), size=size)
+        return camera.to(self.scene.box_min.device)

@@ -18,13 +18,13 @@ from torch.nn import functional as F
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import fibonacci_hemisphere
+from charnerf.geometry.framing import LEAST_DISTANCE
 from charnerf.geometry.hull import may_hold
 from charnerf.geometry.safe import safe_normalize
 from charnerf.types import LeftOut, Scene
 
 BLOCK = 4  # cells a side
 CHUNK = 8192  # points evaluated at once; larger batches leave the caches
-CAMERA_DISTANCE = 4.0  # metres, of the cameras whose directions are averaged over: that of the captures
 MIDDLE_LEVEL = 20.0  # 1/m; where interpolation between grid points is most faithful
 ACTIVE_SHARE = 0.25  # a block counts as near the surface from this share of the level on
 
@@ -115,7 +115,7 @@ def camera_positions(scene: Scene, num_cameras: int) -> Tensor:
     if num_cameras < 1:
         raise DataError(f"num_cameras: found {num_cameras}, expected at least 1.")
     centre = 0.5 * (scene.box_min + scene.box_max)
-    return centre + CAMERA_DISTANCE * fibonacci_hemisphere(num_cameras).to(centre)
+    return centre + LEAST_DISTANCE * fibonacci_hemisphere(num_cameras).to(centre)
 
 
 class GridSampler:

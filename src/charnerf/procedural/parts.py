@@ -7,6 +7,7 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from charnerf.geometry.framing import HEIGHT
 from charnerf.procedural.shapes import Shape
 
 Texels = NDArray[np.uint8]
@@ -124,15 +125,15 @@ def assemble(parts: list[Part]) -> trimesh.Scene:
     return scene
 
 
-def to_world(parts: list[Part], height_m: float = 2.0) -> list[Part]:
-    """Scale to a height with the feet on z = 0 and the bounding box centred on the z axis."""
+def to_world(parts: list[Part]) -> list[Part]:
+    """Scale to the world's height with the feet on z = 0 and the bounding box centred on the z axis."""
     points = np.concatenate([part.shape.vertices for part in parts])
     low, high = points.min(axis=0), points.max(axis=0)
-    scale = height_m / (high[2] - low[2])
+    scale = HEIGHT / (high[2] - low[2])
     middle = np.array((0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]))
     world = []
     for part in parts:
         vertices = (part.shape.vertices - middle) * scale
-        vertices[:, 2] = np.clip(vertices[:, 2], 0.0, height_m)
+        vertices[:, 2] = np.clip(vertices[:, 2], 0.0, HEIGHT)
         world.append(Part(part.name, Shape(vertices, part.shape.faces, part.shape.uv), part.texels))
     return world

@@ -15,7 +15,8 @@ from tqdm import tqdm
 from charnerf.errors import DataError
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.report import plot_curve, summary_lines
-from charnerf.inference.model import HEIGHT, TEXTURE_SIZE, Model, TextureKind
+from charnerf.geometry.framing import HEIGHT
+from charnerf.inference.model import TEXTURE_SIZE, Model, TextureKind
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet

@@ -16,8 +16,8 @@ from PIL import Image
 from charnerf.drawings.align import figure_box, half_extent, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array, load_drawing
-from charnerf.drawings.turnaround import SIDES, source_cameras
 from charnerf.errors import CharNeRFError, DataError
+from charnerf.geometry.framing import SOURCE_ORDER, source_cameras
 from charnerf.inference import weights as runs
 from charnerf.inference.model import Model
 from charnerf.reporting.blocks import Block, Heading, Picture, Text
@@ -25,7 +25,6 @@ from charnerf.reporting.pictures import CELL, picture_on_white, save_matrix
 from charnerf.reporting.rows import Row
 from charnerf.types import SourceViews
 
-VIEWS = {"front": 0.0, "side": SIDES["left"], "back": 180.0}  # azimuth
 SHOWN = (30.0, 150.0)  # azimuths rendered
 ROUNDNESS, THICKEST = (
     0.7,
@@ -54,7 +53,7 @@ def find_drawings(folder: Path) -> list[DrawnCharacter]:
         files: dict[str, Path] = {}
         others = []
         for path in _pictures(sub):
-            views = [view for view in VIEWS if view in re.split("[^a-z]+", path.stem.lower())]
+            views = [view for view in SOURCE_ORDER if view in re.split("[^a-z]+", path.stem.lower())]
             if len(views) != 1:
                 others.append(path)
             elif views[0] in files:
@@ -84,21 +83,20 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
         DataError: If a picture can not be read or shows no figure.
     """
     cut = {view: _cut_out(path) for view, path in character.files.items()}
-    told = "" if len(cut) == len(VIEWS) else f"drawn: {', '.join(cut)}"
+    told = "" if len(cut) == len(SOURCE_ORDER) else f"drawn: {', '.join(cut)}"
     if "back" not in cut:
         cut["back"] = cut["front"][:, ::-1].copy()
     if "side" not in cut:
         cut["side"] = guessed_side(cut["front"])
-    names = list(VIEWS)
-    boxes = [figure_box(cut[view][..., 3], f"{character.name}, {view}") for view in names]
-    extent = half_extent([(cut[view][..., 3], box) for view, box in zip(names, boxes, strict=True)])
+    boxes = [figure_box(cut[view][..., 3], f"{character.name}, {view}") for view in SOURCE_ORDER]
+    extent = half_extent([(cut[view][..., 3], box) for view, box in zip(SOURCE_ORDER, boxes, strict=True)])
     canvases = [
-        place(cut[view], box, extent=extent, size=size) for view, box in zip(names, boxes, strict=True)
+        place(cut[view], box, extent=extent, size=size) for view, box in zip(SOURCE_ORDER, boxes, strict=True)
     ]
-    flags = torch.zeros(1, len(names), dtype=torch.bool)
+    flags = torch.zeros(1, len(SOURCE_ORDER), dtype=torch.bool)
     views = SourceViews(
         images=torch.from_numpy(np.stack(canvases)).permute(0, 3, 1, 2)[None].contiguous(),
-        cameras=source_cameras([VIEWS[view] for view in names], extent, size),
+        cameras=source_cameras(radius=extent, size=size).to(torch.float32)[None],
         present=~flags,
         mirrored=flags.clone(),
     )
@@ -157,7 +155,7 @@ def drawn_matrix(
         except CharNeRFError as error:
             problems.append(f"{character.name} is left out: {error}")
     if lines:
-        path = save_matrix(folder / f"report_drawings{suffix}.png", [*VIEWS, *models], lines)
+        path = save_matrix(folder / f"report_drawings{suffix}.png", [*SOURCE_ORDER, *models], lines)
         blocks.append(Picture(path, "Drawings through every row, seen from azimuth 30 and 150 degrees"))
     told = (
         "No truth exists for these. A back that is not drawn is the mirrored front, a side that is not drawn a guess from the"

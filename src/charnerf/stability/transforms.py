@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles, pixel_rays, project
+from charnerf.geometry.cameras import pixel_rays, project
+from charnerf.geometry.framing import source_cameras
 from charnerf.geometry.hull import build_hull, hull_contains, occupied_edges
 from charnerf.geometry.rays import box_interval
 from charnerf.stability.measure import Bounds, Errors, Target, count_non_finite, doubled, largest
@@ -71,12 +72,7 @@ MOTIONS = (
 
 def _cameras(target: Target, *, orthographic: bool) -> Cameras:
     """Front, side and back."""
-    azimuth = torch.tensor([0.0, 90.0, 180.0], dtype=torch.float64)
-    directions = direction_from_angles(azimuth, torch.zeros_like(azimuth))
-    centre = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
-    cameras = cameras_towards(
-        directions, target=centre, distance=4.0, half_extent=1.2, size=64, orthographic=orthographic
-    )
+    cameras = source_cameras(radius=1.2, size=64, orthographic=orthographic)
     return cameras.to(target.dtype).to(target.device)
 
 

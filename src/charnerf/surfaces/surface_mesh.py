@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from charnerf.geometry.framing import CENTRE, framing_radius
 from charnerf.surfaces.color import linear_from_bytes
 
 CUTOFF = 0.5
@@ -67,6 +68,13 @@ class SurfaceMesh:
             if material.texture is not None:
                 arrays += [material.texture.pixels, *material.texture.levels]
         return sum(array.nbytes for array in arrays)
+
+    @property
+    def framing_radius(self) -> float:
+        """Radius of the sphere that pictures of the whole surface frame, m."""
+        return framing_radius(
+            float(np.linalg.norm(self.triangles.reshape(-1, 3) - np.array(CENTRE), axis=-1).max())
+        )
 
     @property
     def has_cutouts(self) -> bool:
