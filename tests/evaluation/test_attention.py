@@ -26,7 +26,7 @@ def attention():
     torch.manual_seed(3)
     combinator = ViewAttention(
         **{"width": WIDTH, "num_heads": HEADS, "attention_width": None, "residual": False, "norm": True},
-        **{"temperature": None, "view_scale": 1.7, "rate": 1.0},
+        **{"temperature": None, "view_scale": 1.7, "lr_scale": 1.0},
     )
     return tiny_models.shake(combinator.double())
 
@@ -43,8 +43,8 @@ def test_the_parts_sum_to_the_dot_product_of_the_concatenated_vectors(attention,
     """Paper: Q = V + d and K = V + d^(i), concatenated; the split is exact because a sum over parts is a sum."""
     features, dirs, sources = given
     scale = attention.view_scale
-    queries = safe_normalize(attention.parts.split(attention.parts.queries(features)))  # (P, V, K, D / K)
-    keys = safe_normalize(attention.parts.split(attention.parts.keys(features)))
+    queries = safe_normalize(attention.split(attention.queries(features)))  # (P, V, K, D / K)
+    keys = safe_normalize(attention.split(attention.keys(features)))
     own = (scale * dirs)[:, None, None].expand(-1, VIEWS, HEADS, -1)
     theirs = (scale * sources)[:, :, None].expand(-1, -1, HEADS, -1)
     whole = torch.einsum("pvkd,pwkd->pkvw", torch.cat((queries, own), -1), torch.cat((keys, theirs), -1))

@@ -57,7 +57,7 @@ def test_one_view_is_itself(name):
 def test_attention_over_one_view_is_its_value(name):
     features, dirs, sources, valid = inputs(1)
     combine = make(name)
-    torch.testing.assert_close(combine(features, dirs, sources, valid), combine.parts.values(features[:, 0]))
+    torch.testing.assert_close(combine(features, dirs, sources, valid), combine.values(features[:, 0]))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -124,9 +124,9 @@ def test_split_logits_sum_to_the_plain_concatenated_dot_product(temperature):
     size = WIDTH // HEADS
     for head in range(HEADS):
         piece = slice(head * size, (head + 1) * size)
-        query = safe_normalize(features @ combine.parts.queries.weight.T[:, piece])
-        key = safe_normalize(features @ combine.parts.keys.weight.T[:, piece])
-        factor = 1.0 if temperature is None else combine.parts.log_temperature.exp().sqrt()
+        query = safe_normalize(features @ combine.queries.weight.T[:, piece])
+        key = safe_normalize(features @ combine.keys.weight.T[:, piece])
+        factor = 1.0 if temperature is None else combine.log_temperature.exp().sqrt()
         scaled = combine.view_scale * dirs[:, None].expand(-1, 4, -1)
         whole_query = torch.cat((factor * query, scaled), dim=-1)
         whole_key = torch.cat((factor * key, combine.view_scale * sources), dim=-1)
@@ -141,17 +141,15 @@ def test_without_view_scale_it_is_self_attention():
     plain = SelfAttention(**attention()).double()
     warm = attention(temperature=math.sqrt((size + 3) / size))
     view = ViewAttention(**warm, view_scale=0.0).double()
-    view.parts.load_state_dict(plain.parts.state_dict(), strict=False)
+    view.load_state_dict(plain.state_dict(), strict=False)
     features, dirs, sources, valid = inputs(4)
     torch.testing.assert_close(
         view(features, dirs, sources, valid), plain(features, dirs, sources, valid), atol=1e-8, rtol=0
     )
     bare = ViewAttention(**attention(), view_scale=0.0).double()
-    bare.parts.load_state_dict(plain.parts.state_dict())
+    bare.load_state_dict(plain.state_dict(), strict=False)
     logits = bare.logits(features, dirs, sources)
-    queries = safe_normalize(plain.parts.split(plain.parts.queries(features)))
-    keys = safe_normalize(plain.parts.split(plain.parts.keys(features)))
-    expected = plain.scale * plain.parts.feature_logits(queries, keys)
+    expected = plain.scale * plain.feature_logits(features)
     torch.testing.assert_close(logits.features * math.sqrt((size + 3) / size), expected)
     assert logits.view.eq(0).all()
 
@@ -171,14 +169,13 @@ def test_directions_are_signed_and_opposite_views_differ():
 def test_rows_sum_to_one_and_averaging_weights_first_changes_nothing(name):
     features, _, _, valid = inputs(4)
     combine = make(name)
-    parts = combine.parts
     logits = torch.randn(POINTS, HEADS, 4, 4, dtype=torch.float64)
     weights = torch.softmax(masked_logits(logits, valid), dim=-1)
     torch.testing.assert_close(weights.sum(-1), torch.ones_like(weights[..., 0]))
     assert (weights[2:] * ~valid[2:, None, None]).sum() == 0
-    rows = torch.einsum("phij,pjhd->pihd", weights, parts.split(parts.values(features))).flatten(-2)
+    rows = torch.einsum("phij,pjhd->pihd", weights, combine.split(combine.values(features))).flatten(-2)
     averaged_later = (rows * view_weights(valid, rows.dtype)[..., None]).sum(1)
-    torch.testing.assert_close(parts.attend(logits, features, valid), averaged_later)
+    torch.testing.assert_close(combine.attend(logits, features, valid), averaged_later)
 
 
 def test_the_residual_form_adds_the_mean_and_normalises():
@@ -189,11 +186,11 @@ def test_the_residual_form_adds_the_mean_and_normalises():
     names = {name for name, _ in combine.named_parameters()}
     plain = {name for name, _ in tiny_models.combinator("sa").named_parameters()}
     assert names - plain == {
-        "parts.norm.weight",
-        "parts.norm.bias",
-        "parts.output.weight",
-        "parts.output.bias",
-        "parts.log_temperature",
+        "norm.weight",
+        "norm.bias",
+        "output.weight",
+        "output.bias",
+        "log_temperature",
     }
 
 
@@ -223,7 +220,7 @@ def test_attention_may_be_narrower_than_the_network(name):
     kind = {"sa": SelfAttention, "view_mha": partial(ViewAttention, view_scale=1.0)}[name]
     features, dirs, sources, valid = inputs(3)
     narrow = kind(**tiny_models.attention(attention_width=4)).double()
-    assert narrow.parts.values.out_features == 4 and narrow.parts.norm is None
+    assert narrow.values.out_features == 4 and narrow.norm is None
     assert narrow(features, dirs, sources, valid).shape == (POINTS, WIDTH)
     plain = kind(**tiny_models.attention()).double()
     same = kind(**tiny_models.attention(attention_width=WIDTH)).double()
@@ -237,5 +234,5 @@ def test_the_residual_without_its_norm_is_the_sum():
     bare.load_state_dict(plain.state_dict(), strict=False)
     features, dirs, sources, valid = inputs(3)
     mean = tiny_models.combinator("mean")(features, dirs, sources, valid)
-    expected = mean + bare.parts.output(plain(features, dirs, sources, valid))
+    expected = mean + bare.output(plain(features, dirs, sources, valid))
     torch.testing.assert_close(bare(features, dirs, sources, valid), expected)

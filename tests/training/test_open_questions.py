@@ -11,7 +11,7 @@ PAPER = ("experiment=charnerf", "encoder=single", "scale.steps=2", "validation.t
 
 
 def test_a_combinator_learns_at_its_own_rate_and_points_are_seen_from_cameras(figure_dataset, tmp_path):
-    cfg = small_runs.smoke_config(figure_dataset, *PAPER, "combinator.rate=0.25", "surface_dirs=camera")
+    cfg = small_runs.smoke_config(figure_dataset, *PAPER, "combinator.lr_scale=0.25", "surface_dirs=camera")
     run = small_runs.assemble(cfg, tmp_path)
     others, own = run.module.configure_optimizers().param_groups
     assert own["lr"] == 0.25 * others["lr"] == 0.25 * cfg.scale.learning_rate
@@ -30,9 +30,9 @@ def test_a_combinator_learns_at_its_own_rate_and_points_are_seen_from_cameras(fi
 def test_one_rate_for_all_is_one_group_and_muon_takes_no_other(figure_dataset, tmp_path):
     cfg = small_runs.smoke_config(figure_dataset, *PAPER)
     assert len(small_runs.assemble(cfg, tmp_path / "one").module.configure_optimizers().param_groups) == 1
-    cfg = small_runs.smoke_config(figure_dataset, *PAPER, "optimizer=muon", "combinator.rate=0.25")
+    cfg = small_runs.smoke_config(figure_dataset, *PAPER, "optimizer=muon", "combinator.lr_scale=0.25")
     with pytest.raises(
-        ConfigError, match=r"combinator\.rate: found 0\.25, but this optimizer takes no groups"
+        ConfigError, match=r"combinator\.lr_scale: found 0\.25, but this optimizer takes no groups"
     ):
         small_runs.assemble(cfg, tmp_path / "two").module.configure_optimizers()
 

@@ -19,9 +19,9 @@ def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[t
         yield "combinator.num_heads", f"found {heads}, expected a divisor of {name} = {wide}."
 
 
-def _rate_is_positive(rate: float) -> Iterator[tuple[str, str]]:
-    if not rate > 0:
-        yield "combinator.rate", f"found {rate}, expected more than 0."
+def _lr_scale_is_positive(lr_scale: float) -> Iterator[tuple[str, str]]:
+    if not lr_scale > 0:
+        yield "combinator.lr_scale", f"found {lr_scale}, expected more than 0."
 
 
 def _something_ends_the_run(steps: int | None, seconds: float | None) -> Iterator[tuple[str, str]]:
@@ -71,7 +71,7 @@ def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
 
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("combinator.num_heads", "model.width", "combinator.attention_width"), _heads_divide_width),
-    (("combinator.rate",), _rate_is_positive),
+    (("combinator.lr_scale",), _lr_scale_is_positive),
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss.weights",), _some_term_counts),

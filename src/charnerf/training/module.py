@@ -150,21 +150,21 @@ class TrainingModule(L.LightningModule):
         self.log_dict(measured, batch_size=1, sync_dist=True)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        """The optimiser; its rate is set before every step. A combinator with a rate of its own is a group of its own."""
+        """The optimiser; its rate is set before every step. A combinator with an lr_scale other than 1 is a group of its own."""
         combinators = [one for one in self.model.modules() if isinstance(one, AbstractCombinator)]
-        rate = combinators[0].rate
+        lr_scale = combinators[0].lr_scale
         own = {id(p): p for one in combinators for p in one.parameters()}
-        if rate == 1.0 or not own:
+        if lr_scale == 1.0 or not own:
             return self.make_optimizer(self.model.parameters())
         others = [p for p in self.model.parameters() if id(p) not in own]
         try:
             optimizer = self.make_optimizer([{"params": others}, {"params": list(own.values())}])
         except (AttributeError, TypeError) as error:
             raise ConfigError(
-                f"combinator.rate: found {rate}, but this optimizer takes no groups of parameters ({error}); expected 1,"
+                f"combinator.lr_scale: found {lr_scale}, but this optimizer takes no groups of parameters ({error}); expected 1,"
                 " or an optimizer of torch.optim."
             ) from error
-        optimizer.param_groups[1]["lr"] *= rate
+        optimizer.param_groups[1]["lr"] *= lr_scale
         return optimizer
 
     def on_train_start(self) -> None:

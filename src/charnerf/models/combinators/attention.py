@@ -5,12 +5,13 @@ import math
 import torch
 from torch import Tensor, nn
 
-from charnerf.models.combinators.base import masked_logits, view_weights
+from charnerf.geometry.safe import safe_normalize
+from charnerf.models.combinators.base import AbstractCombinator, masked_logits, view_weights
 from charnerf.models.fused import pair_dots, sum_views
 
 
-class AttentionParts(nn.Module):
-    """Projections and the softmax over views; logits come from the combinator.
+class AbstractAttention(AbstractCombinator):
+    """Multi-head attention over the views; what enters the softmax beside the features is the combinator's own.
 
     Args:
         width: D.
@@ -19,6 +20,7 @@ class AttentionParts(nn.Module):
         residual: Add the mean of the features to the projected attended values (off in the paper's plain form).
         norm: LayerNorm of that sum; read only with `residual`.
         temperature: Start of a learned factor on the feature logits (1 and fixed in the plain form: None).
+        lr_scale: Learning rate of these weights over that of the others.
     """
 
     def __init__(
@@ -30,12 +32,15 @@ class AttentionParts(nn.Module):
         residual: bool,
         norm: bool,
         temperature: float | None,
+        lr_scale: float,
     ) -> None:
         super().__init__()
         inner = attention_width or width
         self.num_heads = num_heads
         self.head_size = inner // num_heads
+        self.scale = 1.0 / math.sqrt(self.head_size)
         self.is_residual = residual
+        self.lr_scale = lr_scale
         self.queries = nn.Linear(width, inner, bias=False)
         self.keys = nn.Linear(width, inner, bias=False)
         self.values = nn.Linear(width, inner, bias=False)
@@ -49,8 +54,10 @@ class AttentionParts(nn.Module):
         """Split (P, V, A) into heads, (P, V, K, A / K)."""
         return x.unflatten(-1, (self.num_heads, -1))
 
-    def feature_logits(self, queries: Tensor, keys: Tensor) -> Tensor:
-        """Dot products of every query with every key, (P, K, V query, V key), times the temperature."""
+    def feature_logits(self, view_features: Tensor) -> Tensor:
+        """Cosines of every view's query and every view's key, (P, K, V query, V key), times the temperature."""
+        queries = safe_normalize(self.split(self.queries(view_features)))
+        keys = safe_normalize(self.split(self.keys(view_features)))
         logits = pair_dots(queries, keys).permute(0, 3, 1, 2)
         return logits if self.log_temperature is None else logits * self.log_temperature.exp()
 

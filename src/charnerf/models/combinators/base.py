@@ -10,11 +10,11 @@ class AbstractCombinator(nn.Module, ABC):
 
     Attributes:
         sees_query: Whether the result depends on the query direction.
-        rate: Learning rate of its weights over that of the others.
+        lr_scale: Learning rate of its weights over that of the others.
     """
 
     sees_query: bool
-    rate: float = 1.0
+    lr_scale: float = 1.0
 
     @abstractmethod
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:

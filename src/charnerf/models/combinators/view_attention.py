@@ -8,8 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.geometry.safe import safe_normalize
-from charnerf.models.combinators.attention import AttentionParts
-from charnerf.models.combinators.base import AbstractCombinator
+from charnerf.models.combinators.attention import AbstractAttention
 
 
 @dataclass(frozen=True)
@@ -21,21 +20,21 @@ class AttentionLogits:
 
 
 @final
-class ViewAttention(AbstractCombinator):
+class ViewAttention(AbstractAttention):
     """Attention with Q = V^(i) + s d and K = V^(i) + s d^(i), "+" concatenating.
 
     Each head holds its slice of the projected, normalised features and the whole direction, and no projection mixes the two, so
     that its logit is exactly a feature part plus a view part. Directions are signed: front and back differ.
 
     Args:
-        width: D.
-        num_heads: K.
-        residual: See AttentionParts.
-        temperature: See AttentionParts.
         view_scale: Start of the learned factor s; 0 would be a stationary point.
-        attention_width: See AttentionParts.
-        norm: See AttentionParts.
-        rate: Learning rate of these weights over that of the others.
+        width: This and all others: see AbstractAttention.
+        num_heads: K.
+        attention_width: Of queries, keys and values.
+        residual: Add the mean of the features.
+        norm: LayerNorm of that sum.
+        temperature: Start of a factor on the feature logits.
+        lr_scale: Learning rate over that of the others.
 
     Source: paper, View direction attended multi-head self attention; what it leaves open is chosen in the notes: the n rows are
     averaged, s starts at 1.
@@ -46,33 +45,30 @@ class ViewAttention(AbstractCombinator):
     def __init__(
         self,
         *,
+        view_scale: float,
         width: int,
         num_heads: int,
-        residual: bool,
-        temperature: float | None,
-        view_scale: float,
         attention_width: int | None,
+        residual: bool,
         norm: bool,
-        rate: float,
+        temperature: float | None,
+        lr_scale: float,
     ) -> None:
-        super().__init__()
-        self.parts = AttentionParts(
+        super().__init__(
             width=width,
             num_heads=num_heads,
             attention_width=attention_width,
             residual=residual,
             norm=norm,
             temperature=temperature,
+            lr_scale=lr_scale,
         )
-        self.rate = rate
         self.view_scale = nn.Parameter(torch.tensor(float(view_scale)))
-        self.scale = 1.0 / math.sqrt(self.parts.head_size + 3)
+        self.scale = 1.0 / math.sqrt(self.head_size + 3)
 
     def logits(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor) -> AttentionLogits:
         """The two parts of the scaled dot products (the paper's analysis plots their means)."""
-        queries = safe_normalize(self.parts.split(self.parts.queries(view_features)))
-        keys = safe_normalize(self.parts.split(self.parts.keys(view_features)))
-        features = self.scale * self.parts.feature_logits(queries, keys)
+        features = self.scale * self.feature_logits(view_features)
         cosines = (safe_normalize(view_dirs)[:, None] * safe_normalize(source_dirs)).sum(-1)  # (P, V key)
         view = (self.scale * self.view_scale.square() * cosines)[:, None, None, :].expand_as(features)
         return AttentionLogits(features=features, view=view)
@@ -80,4 +76,4 @@ class ViewAttention(AbstractCombinator):
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
         """Fuse (P, V, D) to (P, D)."""
         logits = self.logits(view_features, view_dirs, source_dirs)
-        return self.parts.attend(logits.features + logits.view, view_features, valid)
+        return self.attend(logits.features + logits.view, view_features, valid)
