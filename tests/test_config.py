@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from hydra.utils import get_object
-from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf import DictConfig, OmegaConf
 
-from charnerf.config import complete_model, validate, validate_model
+from charnerf.config import validate, validate_model
 from charnerf.config.composition import check_command_line, compose_config
 from charnerf.errors import ConfigError
 from charnerf.inference import weights as runs
@@ -63,16 +63,6 @@ def test_other_options_build(group: str) -> None:
         if option.parent.name == group:
             cfg = compose_config(overrides_for(option))
             assert type(runs.build_part(cfg[group])).__module__.startswith("charnerf.")
-
-
-def test_weights_that_know_no_f1_were_trained_with_the_papers() -> None:
-    cfg = compose_config(["scale=smoke"])
-    with open_dict(cfg):
-        del cfg["single_view"]
-    completed = complete_model(cfg)
-    assert completed.single_view._target_.endswith(".WorldSingleView")
-    validate_model(completed)
-    assert "single_view" not in cfg
 
 
 def test_a_fine_field_is_its_own() -> None:

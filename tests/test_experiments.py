@@ -34,7 +34,7 @@ ENCODER = {
     f"encoder.{part}_{what}" for part in ("coarse", "fine") for what in ("stacks", "width", "channels")
 }
 ENCODER |= {"encoder._target_", "encoder.reduction"}
-ATTENTION = {"num_heads", "attention_width", "residual", "norm", "rate", "temperature", "view_scale"}
+ATTENTION = {"num_heads", "attention_width", "residual", "norm", "lr_scale", "temperature", "view_scale"}
 ATTENTION = {f"combinator.{key}" for key in ATTENTION} | {"combinator._target_"}
 SURFACE = {"loss.weights.surface_rgb", "loss.weights.surface_alpha"}
 PIXELNERF = {
@@ -78,7 +78,7 @@ def test_pixelnerf_is_pixelnerf_at_the_papers_scale() -> None:
     for group, name in (("encoder", "ResNet34"), ("combinator", "Mean"), ("head", "RadianceHead")):
         assert cfg[group]._target_.endswith(f".{name}")
     assert cfg.model.activation._target_.endswith(".ReLU") and cfg.density._target_.endswith(
-        ".SingleViewDensity"
+        ".ViewInF1Density"
     )
 
 

@@ -30,12 +30,12 @@ from support import helpers, tiny_models
 WIDTH = tiny_models.WIDTH
 
 
-def point_inputs(num_points: int = 9, num_views: int = 3, *, extras: int = 0) -> PointInputs:
+def point_inputs(num_points: int = 9, num_views: int = 3, *, point_features: int = 0) -> PointInputs:
     """Random points as views see them, float64."""
     random = lambda *shape: torch.randn(*shape, dtype=torch.float64)  # noqa: E731
     return PointInputs(
         latents=random(num_points, num_views, WIDTH),
-        extras=random(num_points, num_views, extras),
+        point_features=random(num_points, num_views, point_features),
         source_rgb=torch.rand(num_points, num_views, 3, dtype=torch.float64),
         shares=torch.rand(num_points, num_views, 2, dtype=torch.float64),
         visibility=torch.rand(num_points, num_views, dtype=torch.float64),
@@ -118,7 +118,7 @@ def test_a_field_of_one_to_eight_views(num_views):
     order = torch.randperm(num_views)
     turned = {
         name: getattr(inputs, name)[:, order]
-        for name in ("latents", "extras", "source_rgb", "visibility", "valid", "source_dirs")
+        for name in ("latents", "point_features", "source_rgb", "visibility", "valid", "source_dirs")
     }
     again = field(replace(inputs, **turned))
     torch.testing.assert_close(again.rgb, answer.rgb)
@@ -158,16 +158,16 @@ def test_image_hull_features_by_hand():
     expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))
     features = ImageHullFeatures()
     torch.testing.assert_close(features(readings)[0, 0], expected)
-    assert features.num_extras == 16
+    assert features.num_point_features == 16
     section = torch.tensor((0.5, -1.0, 0.25, 0.25, 1.0, 0.0625, 0.3125, 1.25, 1.0625, 0.0, 1 / 3, 1.0))
     both = ImageHullSectionFeatures()
     torch.testing.assert_close(both(readings)[0, 1], torch.cat((features(readings)[0, 1], section)))
-    assert both.num_extras == 28
+    assert both.num_point_features == 28
     all_three = ImageHullSectionConsistencyFeatures()
     torch.testing.assert_close(all_three(readings)[..., :28], both(readings))
     torch.testing.assert_close(all_three(readings)[..., 28:], consistency(readings.source_rgb))
-    assert all_three.num_extras == 36
-    assert ImageFeatures()(readings).shape == (1, 2, 0) and ImageFeatures().num_extras == 0
+    assert all_three.num_point_features == 36
+    assert ImageFeatures()(readings).shape == (1, 2, 0) and ImageFeatures().num_point_features == 0
 
 
 def test_consistency_by_hand():

@@ -14,7 +14,7 @@ WIDTH = tiny_models.WIDTH
 
 
 def inputs_of(
-    f1, points: torch.Tensor, view_dirs: torch.Tensor, rotations: torch.Tensor, extras: int = 0
+    f1, points: torch.Tensor, view_dirs: torch.Tensor, rotations: torch.Tensor, point_features: int = 0
 ) -> PointInputs:
     """Points as views with these axes see them, the same features whatever the axes are."""
     count, views = len(points), len(rotations)
@@ -23,7 +23,7 @@ def inputs_of(
     )
     return PointInputs(
         latents=random(count, views, f1.latent_size),
-        extras=random(count, views, extras),
+        point_features=random(count, views, point_features),
         source_rgb=random(count, views, 3),
         shares=torch.rand(count, views, 2, dtype=torch.float64),
         visibility=random(count, views),
@@ -43,7 +43,7 @@ def axes(count: int) -> torch.Tensor:
 
 def test_pixelnerfs_code_by_hand():
     """x itself, then for each octave sin and cos of 1.5 2^k x, all in the camera's axes."""
-    f1 = CameraSingleView(width=4, num_extras=0, num_blocks=3, octaves=6, factor=1.5)
+    f1 = CameraSingleView(width=4, num_point_features=0, num_blocks=3, octaves=6, factor=1.5)
     rotation = axes(2)
     points = torch.rand(5, 3, dtype=torch.float64) - 0.5
     found = f1.locate(points, rotation)
@@ -60,11 +60,11 @@ def test_pixelnerfs_code_by_hand():
 @pytest.mark.parametrize("name", ["world", "camera"])
 def test_whether_turning_the_world_changes_anything(name, num_blocks):
     """Points, directions and cameras turned together: the same to the cameras' f1, not to the world's."""
-    f1 = tiny_models.shake(tiny_models.f1(name, num_extras=2, num_blocks=num_blocks).double())
+    f1 = tiny_models.shake(tiny_models.f1(name, num_point_features=2, num_blocks=num_blocks).double())
     points, turn, rotations = torch.rand(6, 3, dtype=torch.float64) - 0.5, axes(1)[0], axes(3)
     dirs = safe_normalize(torch.randn(6, 3, dtype=torch.float64))
-    before = inputs_of(f1, points, dirs, rotations, extras=2)
-    after = inputs_of(f1, points @ turn.T, dirs @ turn.T, turn @ rotations, extras=2)
+    before = inputs_of(f1, points, dirs, rotations, point_features=2)
+    after = inputs_of(f1, points @ turn.T, dirs @ turn.T, turn @ rotations, point_features=2)
     difference = (f1(before, before.view_dirs) - f1(after, after.view_dirs)).abs().amax()
     assert (difference < 1e-9) == (name == "camera")
     other = f1(before, -before.view_dirs)

@@ -12,9 +12,10 @@ from charnerf.models.combinators.learned import LearnedWeights
 from charnerf.models.combinators.mean import Mean
 from charnerf.models.combinators.self_attention import SelfAttention
 from charnerf.models.combinators.view_attention import ViewAttention
-from charnerf.models.density.single_view import SingleViewDensity
+from charnerf.models.density.base import AbstractDensity
 from charnerf.models.density.view_dependent import ViewDependentDensity
 from charnerf.models.density.view_free import ViewFreeDensity
+from charnerf.models.density.view_in_f1 import ViewInF1Density
 from charnerf.models.encoders.double import DoubleHourglass
 from charnerf.models.encoders.single import SingleHourglass
 from charnerf.models.features.image import ImageFeatures
@@ -32,18 +33,14 @@ from charnerf.models.views.turnaround import Turnaround
 
 WIDTH = 12
 FREQUENCIES = 3
-DENSITIES = {
-    "view_free": ViewFreeDensity,
-    "view_dependent": ViewDependentDensity,
-    "single_view": SingleViewDensity,
-}
+DENSITIES = ("view_free", "view_dependent", "view_in_f1")
 COMBINATORS = ("mean", "sa", "view_mha", "learned")
 
 
 def attention(**changes: Any) -> dict[str, Any]:
     """Arguments of the paper's plain attention with two heads, some of them changed."""
     plain = {"width": WIDTH, "num_heads": 2, "attention_width": None, "residual": False, "norm": True}
-    return {**plain, "temperature": None, "rate": 1.0, **changes}
+    return {**plain, "temperature": None, "lr_scale": 1.0, **changes}
 
 
 def combinator(name: str, *, width: int = WIDTH) -> AbstractCombinator:
@@ -53,6 +50,16 @@ def combinator(name: str, *, width: int = WIDTH) -> AbstractCombinator:
         "sa": lambda: SelfAttention(**attention(width=width)),
         "view_mha": lambda: ViewAttention(**attention(width=width), view_scale=1.0),
         "learned": lambda: LearnedWeights(width=width, hidden=8),
+    }
+    return made[name]()
+
+
+def density_by(name: str, *, width: int = WIDTH) -> AbstractDensity:
+    """Which stages see directions, by the option's name."""
+    made = {
+        "view_free": lambda: ViewFreeDensity(width=width),
+        "view_dependent": ViewDependentDensity,
+        "view_in_f1": ViewInF1Density,
     }
     return made[name]()
 
@@ -80,9 +87,11 @@ def double() -> DoubleHourglass:
     )
 
 
-def f1(name: str, *, num_extras: int = 0, num_blocks: int = 1, width: int = WIDTH) -> AbstractSingleView:
+def f1(
+    name: str, *, num_point_features: int = 0, num_blocks: int = 1, width: int = WIDTH
+) -> AbstractSingleView:
     """f1 by its option's name."""
-    sizes = {"width": width, "num_extras": num_extras, "num_blocks": num_blocks}
+    sizes = {"width": width, "num_point_features": num_point_features, "num_blocks": num_blocks}
     if name == "camera":
         return CameraSingleView(**sizes, octaves=2, factor=1.5)
     return WorldSingleView(**sizes, num_frequencies=FREQUENCIES)
@@ -113,9 +122,11 @@ def tiny_model(
 
     def field() -> Field:
         return Field(
-            single_view=f1(single_view, num_extras=inputs.num_extras, num_blocks=num_blocks, width=width),
+            single_view=f1(
+                single_view, num_point_features=inputs.num_point_features, num_blocks=num_blocks, width=width
+            ),
             combinator=combinator(combining, width=width),
-            density=DENSITIES[density](width=width),
+            density=density_by(density, width=width),
             head=BlendHead(width=width, hidden=8) if head == "blend" else RadianceHead(width=width),
             activation=ShiftedSoftplus(shift=-1.0, scale=20.0),
             feature_channels=encoder.out_channels,

@@ -43,7 +43,7 @@ def test_modules_are_those_of_the_config():
 @pytest.mark.parametrize(
     ("overrides", "absent"),
     [
-        (["features=image"], "from_extras"),
+        (["features=image"], "from_point_features"),
         (["density=view_dependent"], "density.colour"),
         (["head=radiance"], "head.score"),
         (["combinator=mean"], "combinator"),

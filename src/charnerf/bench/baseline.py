@@ -144,7 +144,7 @@ class PixelNeRFLike:
         return field(
             PointInputs(
                 latents=latents,
-                extras=network.features(readings),
+                point_features=network.features(readings),
                 source_rgb=source_rgb,
                 shares=(pixels / size).transpose(0, 1),
                 visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),

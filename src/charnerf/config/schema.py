@@ -115,7 +115,7 @@ class ModelSettings:
     activation: _part("charnerf.models.activations")  # type: ignore[valid-type]
 
 
-F1_GIVEN = ("width", "num_frequencies", "num_extras", "num_blocks")
+F1_GIVEN = ("width", "num_frequencies", "num_point_features", "num_blocks")
 TRAINER_GIVEN = (
     "callbacks",
     "logger",
@@ -166,9 +166,6 @@ class RunConfig:
     trainer: _part("lightning", given=TRAINER_GIVEN)  # type: ignore[valid-type]
 
 
-LATER_SECTIONS = {  # of a model, with what weights that do not know of them were trained with
-    "single_view": {"_target_": "charnerf.models.single_view.world.WorldSingleView"},
-}
 MODEL_SECTIONS = (
     "model",
     "encoder",

@@ -15,7 +15,7 @@ from omegaconf.errors import OmegaConfBaseException
 from charnerf.config.checks import BROKEN, MISSING, check_section
 from charnerf.config.problems import Problems, join
 from charnerf.config.rules import RULES, idle_settings
-from charnerf.config.schema import LATER_SECTIONS, MODEL_SECTIONS, RunConfig
+from charnerf.config.schema import MODEL_SECTIONS, RunConfig
 from charnerf.errors import ConfigError
 
 INTERPOLATION = re.compile(r"\$\{([\w.]+)\}")
@@ -61,12 +61,6 @@ def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> N
         whole = cfg  # reported below, by key
     chosen = OmegaConf.masked_copy(whole, [name for name in MODEL_SECTIONS if name in whole])
     _validate_against(schema, chosen, trusted_targets)
-
-
-def complete_model(cfg: DictConfig) -> DictConfig:
-    """Return a config that came with weights, with the sections that it is too old to know of."""
-    missing = {name: section for name, section in LATER_SECTIONS.items() if name not in cfg}
-    return OmegaConf.unsafe_merge(missing, cfg) if missing else cfg  # type: ignore[return-value]
 
 
 def check_files(cfg: DictConfig) -> None:

@@ -138,9 +138,8 @@ def know(network: CharNeRF, encoded: EncodedViews, placed: PlacedRays) -> KnownR
     parts = []
     for start in range(0, len(points), size):
         inputs = inputs_of(points[start : start + size], dirs[start : start + size])
-        read = inputs.view_dirs if field.density.sees_directions else torch.zeros_like(inputs.view_dirs[:1])
-        features = field.single_view(inputs, read)
-        unread = {"latents": inputs.latents[..., :0], "extras": inputs.extras[..., :0]}
+        features = field.view_features(inputs)
+        unread = {"latents": inputs.latents[..., :0], "point_features": inputs.point_features[..., :0]}
         slim = replace(inputs, **unread, encoded_points=inputs.encoded_points[..., :0])
         parts.append(_Rows(features, slim))
     numbers = torch.full_like(placed.inside, len(points), dtype=torch.long)
@@ -182,9 +181,7 @@ def render_known(
 
 def answer_known(field: Field, rows: _Rows) -> FieldOutput:
     """What a field answers at samples whose f1 is known."""
-
-    def remembered(inputs: PointInputs, view_dirs: Tensor) -> Tensor:
-        return rows.view_features
-
-    trunk = field.density(rows.inputs, remembered, field.combinator, field.multi_view)
-    return field.answer(trunk, rows.inputs)
+    trunk = field.fuse(rows.view_features, rows.inputs)
+    return FieldOutput(
+        rgb=field.colors(trunk, rows.inputs), densities=field.kept_densities(trunk, rows.inputs)
+    )

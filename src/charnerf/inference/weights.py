@@ -12,11 +12,11 @@ from hydra.utils import get_object, instantiate
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 from yaml import YAMLError
 
-from charnerf.config import MODEL_SECTIONS, complete_model, validate_model
+from charnerf.config import MODEL_SECTIONS, validate_model
 from charnerf.errors import CharNeRFError, ConfigError, DataError
 from charnerf.files import write_aside, write_text
 from charnerf.inference.model import Model
@@ -61,7 +61,7 @@ def build_model(cfg: DictConfig) -> CharNeRF:
                 {
                     **width,
                     "num_frequencies": settings.num_frequencies,
-                    "num_extras": features.num_extras,
+                    "num_point_features": features.num_point_features,
                     "num_blocks": settings.num_single_view_blocks,
                 },
             ),
@@ -114,7 +114,6 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
     if file.is_dir():
         file = _weights_of_run(file)
     cfg, state = _read_safetensors(file) if file.suffix == ".safetensors" else _read_checkpoint(file)
-    cfg = complete_model(cfg)
     try:
         validate_model(cfg, trusted_targets=trusted_targets)
     except ConfigError as error:
@@ -155,9 +154,21 @@ def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig, *, note: st
     )
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
     metadata = {"format": FORMAT, "config": json.dumps(OmegaConf.to_container(chosen))}
+    if note is not None:
+        metadata["note"] = note
     with write_aside(file) as aside:
-        save_file(state, str(aside), metadata=metadata if note is None else {**metadata, "note": note})
+        aside.write_bytes(_sorted_metadata(save(state, metadata=metadata)))
     return file
+
+
+def _sorted_metadata(content: bytes) -> bytes:
+    """A safetensors file with its metadata sorted: the library writes them in another order each time."""
+    start = 8 + int.from_bytes(content[:8], "little")
+    header = json.loads(content[8:start])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text = text.ljust(-(-len(text) // 8) * 8)  # tensors begin at a multiple of 8 bytes
+    return len(text).to_bytes(8, "little") + text + content[start:]
 
 
 def save_config(folder: Path, cfg: DictConfig) -> Path:

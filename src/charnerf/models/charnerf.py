@@ -232,7 +232,7 @@ class CharNeRF(nn.Module):
         )
         return PointInputs(
             latents=sight.latents,
-            extras=self.features(readings),
+            point_features=self.features(readings),
             source_rgb=sight.rgb,
             shares=sight.shares,
             visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),

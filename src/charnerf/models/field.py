@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import final
 
+import torch
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
@@ -22,7 +23,7 @@ class Field(nn.Module):
     Args:
         single_view: f1.
         combinator: H.
-        density: The wiring of the query direction.
+        density: Which stages see the query direction.
         head: The colour head.
         activation: From raw values to densities in 1/m.
         feature_channels: F, of the encoder.
@@ -55,13 +56,9 @@ class Field(nn.Module):
 
     def forward(self, inputs: PointInputs) -> FieldOutput:
         """Colours (P, 3) and densities (P,) of points as the views see them; latents come through `from_latents`."""
-        trunk = self.density(inputs, self.single_view, self.combinator, self.multi_view)
-        return self.answer(trunk, inputs)
-
-    def answer(self, trunk: TrunkOutput, inputs: PointInputs) -> FieldOutput:
-        """Colours (P, 3) and densities (P,) of points whose trunk is known, with the query direction in it."""
-        rgb = self.head(trunk.features, trunk.view_features, inputs)
-        return FieldOutput(rgb=rgb, densities=self._kept_densities(trunk, inputs))
+        trunk = self.trunk(inputs)
+        rgb = self.colors(trunk, inputs)
+        return FieldOutput(rgb=rgb, densities=self.kept_densities(trunk, inputs))
 
     def densities(self, inputs: PointInputs, coloured: Callable[[PointInputs], PointInputs]) -> DensityAnswer:
         """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps.
@@ -70,21 +67,40 @@ class Field(nn.Module):
             inputs: Points as the views see them.
             coloured: What the head sees of points whose colours are asked for, from what the trunk saw.
         """
-        trunk = self.density.trunk(inputs, self.single_view, self.combinator, self.multi_view)
+        trunk = self.trunk(inputs)
         # what only the trunk reads need not be kept
-        seen = replace(inputs, latents=inputs.latents[..., :0], extras=inputs.extras[..., :0])
+        seen = replace(inputs, latents=inputs.latents[..., :0], point_features=inputs.point_features[..., :0])
         return DensityAnswer(
-            densities=self._kept_densities(trunk, inputs),
+            densities=self.kept_densities(trunk, inputs),
             state=_Half(trunk, seen),
-            colours=lambda half: self._colours(half.trunk, coloured(half.inputs)),
+            colours=lambda half: self.colors(half.trunk, coloured(half.inputs)),
         )
 
-    def _kept_densities(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
+    def trunk(self, inputs: PointInputs) -> TrunkOutput:
+        """What the densities of points (P) need: f1, H and f2, each with the direction that it may see."""
+        return self.fuse(self.view_features(inputs), inputs)
+
+    def view_features(self, inputs: PointInputs) -> Tensor:
+        """V^(i) (P, V, D): f1."""
+        return self.single_view(inputs, _seen(inputs.view_dirs, self.density.f1_sees_directions))
+
+    def fuse(self, view_features: Tensor, inputs: PointInputs) -> TrunkOutput:
+        """What H and f2 make of V^(i) (P, V, D)."""
+        dirs = _seen(inputs.view_dirs, self.density.combinator_sees_directions)
+        fused = self.combinator(view_features, dirs, inputs.source_dirs, inputs.valid)
+        features, raw = self.multi_view(fused, _seen(inputs.view_dirs, self.density.f2_sees_directions))
+        return TrunkOutput(raw_densities=raw, features=features, view_features=view_features)
+
+    def kept_densities(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
+        """Densities (P,), 1/m."""
         densities: Tensor = self.activation(trunk.raw_densities) * inputs.kept
         return densities
 
-    def _colours(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
-        features = self.density.directed(trunk, inputs, self.combinator)
+    def colors(self, trunk: TrunkOutput, inputs: PointInputs) -> Tensor:
+        """Colours (P, 3)."""
+        features = self.density.color_features(
+            trunk, inputs.view_dirs, inputs.source_dirs, inputs.valid, self.combinator
+        )
         return self.head(features, trunk.view_features, inputs)
 
     def hoist(self, rows: Tensor) -> Tensor:
@@ -93,6 +109,11 @@ class Field(nn.Module):
         Bilinear reading commutes with a linear map (its weights sum to 1, so with the bias too): equal to rounding.
         """
         return self.from_latents(rows)
+
+
+def _seen(view_dirs: Tensor, sees_directions: bool) -> Tensor:
+    """Directions (P, 3), or the zero direction as one row for all points."""
+    return view_dirs if sees_directions else torch.zeros_like(view_dirs[:1])
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ def _random_inputs(field: Field, model: CharNeRF) -> PointInputs:
     visibility = torch.rand(NUM_POINTS, NUM_VIEWS, generator=generator)
     return PointInputs(
         latents=field.hoist(rows).view(NUM_POINTS, NUM_VIEWS, -1),
-        extras=normal(NUM_POINTS, NUM_VIEWS, model.features.num_extras),
+        point_features=normal(NUM_POINTS, NUM_VIEWS, model.features.num_point_features),
         source_rgb=torch.rand(NUM_POINTS, NUM_VIEWS, 3, generator=generator),
         shares=torch.rand(NUM_POINTS, NUM_VIEWS, 2, generator=generator),
         visibility=visibility,

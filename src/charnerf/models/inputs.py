@@ -13,7 +13,7 @@ class PointInputs(TensorRecord):
 
     Attributes:
         latents: (P, V, L), encoder features at the projections, already through the field's linear layer.
-        extras: (P, V, E), further inputs per view (see models/features); E may be 0.
+        point_features: (P, V, E), further inputs per view (see models/features); E may be 0.
         source_rgb: (P, V, 3) in [0, 1], colour of the drawings at the projections.
         shares: (P, V, 2), the projections in shares of the drawings' sides.
         visibility: (P, V) in [0, 1], 1 on the side of the hull that faces the view, falling with depth behind it.
@@ -26,7 +26,7 @@ class PointInputs(TensorRecord):
     """
 
     latents: Tensor
-    extras: Tensor
+    point_features: Tensor
     source_rgb: Tensor
     shares: Tensor
     visibility: Tensor

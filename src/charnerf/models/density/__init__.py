@@ -1,1 +1,1 @@
-"""How directions enter: wirings of f1, H and f2."""
+"""Which stages see the query direction: f1, H and f2, or none of them and only the colour."""

@@ -1,14 +1,10 @@
-"""How the query direction enters: the wiring of f1, H and f2."""
+"""Which stages of a field see the query direction."""
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
-from charnerf.models.inputs import PointInputs
-from charnerf.models.single_view.base import AbstractSingleView
-from charnerf.models.stages import MultiView
 from charnerf.types import TensorRecord
 
 
@@ -21,36 +17,39 @@ class TrunkOutput(TensorRecord):
     view_features: Tensor
 
 
-class AbstractDensity(nn.Module, ABC):
-    """The wiring of f1, H and f2 from inputs to raw density and colour features.
+class AbstractDensity(nn.Module):
+    """Says which stages see the query direction; the others get the zero direction.
 
     Attributes:
-        sees_directions: Whether the density depends on the query direction.
+        f1_sees_directions: Whether f1 does.
+        combinator_sees_directions: Whether H does.
+        f2_sees_directions: Whether f2 does.
     """
 
-    sees_directions: bool
+    f1_sees_directions: bool
+    combinator_sees_directions: bool
+    f2_sees_directions: bool
 
-    @abstractmethod
-    def trunk(
+    @property
+    def sees_directions(self) -> bool:
+        """Whether the density depends on the query direction."""
+        return self.f1_sees_directions or self.combinator_sees_directions or self.f2_sees_directions
+
+    def color_features(
         self,
-        inputs: PointInputs,
-        single_view: AbstractSingleView,
+        trunk: TrunkOutput,
+        view_dirs: Tensor,
+        source_dirs: Tensor,
+        valid: Tensor,
         combinator: AbstractCombinator,
-        multi_view: MultiView,
-    ) -> TrunkOutput:
-        """Run what the densities of points (P) need; features are those before `directed`."""
+    ) -> Tensor:
+        """Features (P, D) for the colour head; those of the trunk, where they have the query direction in them.
 
-    @abstractmethod
-    def directed(self, trunk: TrunkOutput, inputs: PointInputs, combinator: AbstractCombinator) -> Tensor:
-        """Features (P, D) for the colour head, with the query direction in them; needed only where colours are."""
-
-    def forward(
-        self,
-        inputs: PointInputs,
-        single_view: AbstractSingleView,
-        combinator: AbstractCombinator,
-        multi_view: MultiView,
-    ) -> TrunkOutput:
-        """Run the trunk for points (P), features directed."""
-        trunk = self.trunk(inputs, single_view, combinator, multi_view)
-        return replace(trunk, features=self.directed(trunk, inputs, combinator))
+        Args:
+            trunk: What the stages made of points (P).
+            view_dirs: (P, 3).
+            source_dirs: (P, V, 3).
+            valid: (P, V).
+            combinator: H.
+        """
+        return trunk.features

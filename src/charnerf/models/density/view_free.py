@@ -2,15 +2,12 @@
 
 from typing import final
 
-import torch
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
-from charnerf.models.inputs import PointInputs
 from charnerf.models.mlp import ResidualBlock
-from charnerf.models.single_view.base import AbstractSingleView
-from charnerf.models.stages import DIRECTION_FREQUENCIES, MultiView, encode_directions
+from charnerf.models.stages import DIRECTION_FREQUENCIES, encode_directions
 
 
 @final
@@ -21,32 +18,25 @@ class ViewFreeDensity(AbstractDensity):
         width: D.
     """
 
-    sees_directions = False
+    f1_sees_directions = False
+    combinator_sees_directions = False
+    f2_sees_directions = False
 
     def __init__(self, *, width: int) -> None:
         super().__init__()
         self.from_dirs = nn.Linear(6 * DIRECTION_FREQUENCIES, width)
-        self.colour = ResidualBlock(width=width)
+        self.color = ResidualBlock(width=width)
 
-    def trunk(
+    def color_features(
         self,
-        inputs: PointInputs,
-        single_view: AbstractSingleView,
+        trunk: TrunkOutput,
+        view_dirs: Tensor,
+        source_dirs: Tensor,
+        valid: Tensor,
         combinator: AbstractCombinator,
-        multi_view: MultiView,
-    ) -> TrunkOutput:
-        """Run the trunk without a direction; the zero direction is one row for all points."""
-        no_direction = torch.zeros_like(inputs.view_dirs[:1])
-        view_features = single_view(inputs, no_direction)
-        fused = combinator(view_features, no_direction, inputs.source_dirs, inputs.valid)
-        features, raw = multi_view(fused, no_direction)
-        return TrunkOutput(raw_densities=raw, features=features, view_features=view_features)
-
-    def directed(self, trunk: TrunkOutput, inputs: PointInputs, combinator: AbstractCombinator) -> Tensor:
-        """The colour block: the trunk's features, the direction, and what the combinator answers to it."""
-        directed = trunk.features + self.from_dirs(encode_directions(inputs.view_dirs))
+    ) -> Tensor:
+        """The trunk's features, the direction, and what the combinator answers to it, through the colour block."""
+        directed = trunk.features + self.from_dirs(encode_directions(view_dirs))
         if combinator.sees_query:
-            directed = directed + combinator(
-                trunk.view_features, inputs.view_dirs, inputs.source_dirs, inputs.valid
-            )
-        return self.colour(directed)
+            directed = directed + combinator(trunk.view_features, view_dirs, source_dirs, valid)
+        return self.color(directed)

@@ -33,12 +33,12 @@ class AbstractFeatures(ABC):
     """Chooses the further inputs of f1.
 
     Attributes:
-        num_extras: E, further inputs per view.
+        num_point_features: E, further inputs per view.
         reads_hull: Whether the hull's maps are read.
         reads_sections: Whether the hull's cross-sections are read.
     """
 
-    num_extras: int
+    num_point_features: int
     reads_hull: bool
     reads_sections: bool = False
 

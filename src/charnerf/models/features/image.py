@@ -11,7 +11,7 @@ from charnerf.models.features.base import AbstractFeatures, ViewReadings
 class ImageFeatures(AbstractFeatures):
     """No further inputs."""
 
-    num_extras = 0
+    num_point_features = 0
     reads_hull = False
 
     def __call__(self, readings: ViewReadings) -> Tensor:

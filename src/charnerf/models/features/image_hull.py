@@ -20,7 +20,7 @@ class ImageHullFeatures(AbstractFeatures):
     mirrored views have no say in it.
     """
 
-    num_extras = len(DEPTH_SCALES) + 2 * len(EDGE_SCALES) + 3 + 3 + 1
+    num_point_features = len(DEPTH_SCALES) + 2 * len(EDGE_SCALES) + 3 + 3 + 1
     reads_hull = True
 
     def __call__(self, readings: ViewReadings) -> Tensor:

@@ -20,7 +20,7 @@ class ImageHullSectionFeatures(AbstractFeatures):
     is a corner that only the hull has; logarithms of the runs' half-lengths.
     """
 
-    num_extras = ImageHullFeatures.num_extras + 12
+    num_point_features = ImageHullFeatures.num_point_features + 12
     reads_hull = True
     reads_sections = True
 

@@ -19,7 +19,7 @@ class ImageHullSectionConsistencyFeatures(AbstractFeatures):
     views, and the mean of the nearest ones. Zeros where there is one view only.
     """
 
-    num_extras = ImageHullSectionFeatures.num_extras + 8
+    num_point_features = ImageHullSectionFeatures.num_point_features + 8
     reads_hull = True
     reads_sections = True
 

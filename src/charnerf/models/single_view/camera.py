@@ -23,7 +23,7 @@ class CameraSingleView(AbstractSingleView):
 
     Args:
         width: D.
-        num_extras: Further inputs per view.
+        num_point_features: Further inputs per view.
         num_blocks: Residual blocks.
         octaves: Of the point's code.
         factor: Lowest frequency, radians a half-extent of the box.
@@ -31,13 +31,17 @@ class CameraSingleView(AbstractSingleView):
     Source: pixelNeRF (Yu 2021): six octaves, factor 1.5, three blocks before the views' mean.
     """
 
-    def __init__(self, *, width: int, num_extras: int, num_blocks: int, octaves: int, factor: float) -> None:
+    def __init__(
+        self, *, width: int, num_point_features: int, num_blocks: int, octaves: int, factor: float
+    ) -> None:
         super().__init__()
         self.octaves = octaves
         self.factor = factor
         self.latent_size = width * max(1, num_blocks)
         self.from_points = nn.Linear(3 + 2 * 3 * octaves + 3, width)
-        self.from_extras = nn.Linear(num_extras, width, bias=False) if num_extras else None
+        self.from_point_features = (
+            nn.Linear(num_point_features, width, bias=False) if num_point_features else None
+        )
         self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
 
     def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
@@ -52,8 +56,8 @@ class CameraSingleView(AbstractSingleView):
         code, axes = inputs.encoded_points[..., :-ROTATION], inputs.encoded_points[..., -ROTATION:]
         directions = (view_dirs[:, None, :, None] * axes.unflatten(-1, (3, 3))).sum(-2)
         x = self.from_points(torch.cat((code, directions), dim=-1))
-        if self.from_extras is not None:
-            x = x + self.from_extras(inputs.extras)
+        if self.from_point_features is not None:
+            x = x + self.from_point_features(inputs.point_features)
         latents = inputs.latents.unflatten(-1, (-1, x.shape[-1])).unbind(-2)
         if len(self.blocks) == 0:
             return x + latents[0]

@@ -19,18 +19,20 @@ class WorldSingleView(AbstractSingleView):
     Args:
         width: D.
         num_frequencies: nu of eq. 1.
-        num_extras: Further inputs per view.
+        num_point_features: Further inputs per view.
         num_blocks: Residual blocks (paper: 3).
 
     Source: paper, Fig. network.
     """
 
-    def __init__(self, *, width: int, num_frequencies: int, num_extras: int, num_blocks: int) -> None:
+    def __init__(self, *, width: int, num_frequencies: int, num_point_features: int, num_blocks: int) -> None:
         super().__init__()
         self.num_frequencies = num_frequencies
         self.latent_size = width
         self.from_points = nn.Linear(2 * 3 * num_frequencies + 6 * DIRECTION_FREQUENCIES, width)
-        self.from_extras = nn.Linear(num_extras, width, bias=False) if num_extras else None
+        self.from_point_features = (
+            nn.Linear(num_point_features, width, bias=False) if num_point_features else None
+        )
         self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
 
     def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
@@ -46,4 +48,6 @@ class WorldSingleView(AbstractSingleView):
             encode_directions(view_dirs), weight[:, size:], self.from_points.bias
         )
         x = inputs.latents + located[:, None]
-        return self.blocks(x if self.from_extras is None else x.add_(self.from_extras(inputs.extras)))
+        return self.blocks(
+            x if self.from_point_features is None else x.add_(self.from_point_features(inputs.point_features))
+        )
