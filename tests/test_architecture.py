@@ -17,7 +17,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("pictures",),
     ("process",),
     ("geometry",),
-    ("config", "losses", "models", "surfaces", "volume"),
+    ("config", "losses", "models", "reconciling", "surfaces", "volume"),
     ("data", "meshing", "procedural"),
     ("capture", "evaluation"),
     ("drawings",),

@@ -1,0 +1,178 @@
+"""Which view rules which, what is moved where, and the figures of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from charnerf.reconciling.agreement import disagreement, iou, share_apart
+from charnerf.reconciling.heights import row_offsets
+from charnerf.reconciling.registration import SIDE, filled, find_flow, resized, warped
+from charnerf.reconciling.tolerance import tolerances
+
+AGREES = (
+    0.002  # share of two outlines' pixels that may lie apart where views are left as they are, bit for bit
+)
+LEAST_IOU = (
+    0.75  # of a moved outline with its partner's; below, the poses are too unlike for colours to be trusted
+)
+OPPOSITE = 5.0  # degrees by which two azimuths may miss 180 and still be seen from opposite sides
+COPY = 0.03  # mean difference of colours below which two drawings are one and the same
+
+
+@dataclass(frozen=True)
+class ViewAgreement:
+    """How one view agrees with those before it.
+
+    Attributes:
+        partner: Index of the view from the opposite side, whose outline this one's mirrors; None where there is none.
+        apart_before: Share of the two outlines' pixels that lie apart by more than a pixel of 128, as drawn; 0 without a
+            partner, as are the next three.
+        apart_after: The same once moved, before the outline was taken over.
+        rows_apart: `apart_before` by row from the top, (SIDE,).
+        iou_before: Of the outlines as drawn; 1 without a partner.
+        iou_after: Once moved.
+        iou_unmirrored: As drawn, without mirroring: larger where a view was traced.
+        rows_moved: Largest vertical shift, share of the side.
+        is_mended: Whether anything was changed.
+        is_trusted: Whether its colours stand where they should: False where it could not be reconciled.
+        copies: Index of a view of which this one is a copy, mirrored or not; None where it is none.
+        tolerance: By how much each row of its outline, once mended, may be off, (SIDE,), pixels of 128; infinite where
+            it carves nothing.
+    """
+
+    partner: int | None
+    apart_before: float
+    apart_after: float
+    rows_apart: np.ndarray
+    iou_before: float
+    iou_after: float
+    iou_unmirrored: float
+    rows_moved: float
+    is_mended: bool
+    is_trusted: bool
+    copies: int | None
+    tolerance: np.ndarray
+
+
+@final
+@dataclass(frozen=True)
+class Reconciliation:
+    """How views are made to agree, found once and done at any size.
+
+    Attributes:
+        views: By view, in the order given.
+        flows: By view, (2, SIDE, SIDE) as `registration` has them; None where a view stays as it is.
+    """
+
+    views: tuple[ViewAgreement, ...]
+    flows: tuple[np.ndarray | None, ...]
+
+    @property
+    def changes_nothing(self) -> bool:
+        """Whether all views stay as they are."""
+        return not any(one.is_mended for one in self.views)
+
+    def apply(self, canvases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Reconcile canvases (S, S, 4) of the same views at any size; a view that agrees is returned as it is."""
+        mended: list[np.ndarray] = []
+        for canvas, view, flow in zip(canvases, self.views, self.flows, strict=True):
+            mended.append(_moved(canvas, flow, None if view.partner is None else mended[view.partner]))
+        return mended
+
+
+def reconcile(canvases: Sequence[np.ndarray], azimuths_deg: Sequence[float]) -> Reconciliation:
+    """Find how views of one character are made to agree.
+
+    Args:
+        canvases: RGBA (S, S, 4) each, float32 in [0, 1], straight alpha, on one scale, floor line and axis; the first rules,
+            then the second, and so on.
+        azimuths_deg: Of their cameras, level.
+
+    Returns:
+        Nothing to do where views agree.
+    """
+    drawn = [resized(canvas, SIDE) for canvas in canvases]
+    partners = [_partner(azimuths_deg, index) for index in range(len(drawn))]
+    flows: list[np.ndarray | None] = []
+    mended: list[np.ndarray] = []
+    for index, (picture, partner) in enumerate(zip(drawn, partners, strict=True)):
+        if partner is not None:
+            target = mended[partner][:, ::-1]
+            agrees = share_apart(target[..., 3], picture[..., 3]) <= AGREES
+            flows.append(None if agrees else find_flow(target, picture))
+        else:
+            flows.append(None if index == 0 else _vertical(row_offsets(mended[0], picture)))
+        mended.append(_moved(picture, flows[index], None if partner is None else mended[partner]))
+    allowed = tolerances([picture[..., 3] for picture in mended], azimuths_deg)
+    views = [
+        _agreement(picture, flow, partner, mended, _copied(drawn, index), allowed[index])
+        for index, (picture, flow, partner) in enumerate(zip(drawn, flows, partners, strict=True))
+    ]
+    return Reconciliation(tuple(views), tuple(flows))
+
+
+def _moved(canvas: np.ndarray, flow: np.ndarray | None, partner: np.ndarray | None) -> np.ndarray:
+    """A canvas along its flow, with the mirrored outline of its partner where it has one."""
+    if flow is None:
+        return canvas
+    moved = warped(canvas, flow)
+    return moved if partner is None else filled(moved, partner[:, ::-1, 3])
+
+
+def _agreement(
+    picture: np.ndarray,
+    flow: np.ndarray | None,
+    partner: int | None,
+    mended: Sequence[np.ndarray],
+    copies: int | None,
+    tolerance: np.ndarray,
+) -> ViewAgreement:
+    """The figures of one view as drawn (SIDE, SIDE, 4)."""
+    outline = picture[..., 3]
+    target = outline if partner is None else mended[partner][:, ::-1, 3]
+    after = warped(picture, flow)[..., 3] if flow is not None and partner is not None else outline
+    overlap = iou(target, after)
+    return ViewAgreement(
+        partner=partner,
+        apart_before=share_apart(target, outline),
+        apart_after=share_apart(target, after),
+        rows_apart=disagreement(target, outline),
+        iou_before=iou(target, outline),
+        iou_after=overlap,
+        iou_unmirrored=iou(target[:, ::-1], outline),
+        rows_moved=0.0 if flow is None else float(np.abs(flow[0])[target > 0.5].max(initial=0.0)),
+        is_mended=flow is not None,
+        is_trusted=overlap >= LEAST_IOU,
+        copies=copies,
+        tolerance=tolerance,
+    )
+
+
+def _vertical(offsets: np.ndarray | None) -> np.ndarray | None:
+    """Row offsets (SIDE,) as a flow."""
+    if offsets is None:
+        return None
+    down = np.repeat(offsets[:, None], SIDE, axis=1)
+    return np.stack((down, np.zeros_like(down)))
+
+
+def _partner(azimuths_deg: Sequence[float], index: int) -> int | None:
+    """The first earlier view from the opposite side."""
+    turns = [(azimuths_deg[index] - azimuth) % 360.0 for azimuth in azimuths_deg[:index]]
+    return next((i for i, turn in enumerate(turns) if abs(turn - 180.0) <= OPPOSITE), None)
+
+
+def _copied(pictures: Sequence[np.ndarray], index: int) -> int | None:
+    """An earlier picture that a picture is a copy of, mirrored or not."""
+    picture = _premultiplied(pictures[index])
+    for earlier, other in enumerate(map(_premultiplied, pictures[:index])):
+        least = min(np.abs(one - picture).mean() for one in (other, other[:, ::-1]))
+        if least < COPY * (other[..., 3] > 0.5).mean():
+            return earlier
+    return None
+
+
+def _premultiplied(rgba: np.ndarray) -> np.ndarray:
+    return np.concatenate((rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]), axis=-1)
