@@ -7,7 +7,8 @@ import torch
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.artist import PAPER, draw_character, write_drawings
-from charnerf.drawings.turnaround import read_turnaround
+from charnerf.drawings.turnaround import read_views
+from charnerf.drawings.viewpoints import turnaround
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def test_reconstruct_reads_them_as_the_silhouettes_that_were_drawn(character, tm
     """The masks that are cut out of the paper against the captured ones, both brought to one height."""
     front, side, back = write_drawings(draw_character(character, size=256, seed=3), tmp_path)
     size = character.sources.images.shape[-1]
-    read = read_turnaround(front, side, back, size=size, side_is="left").views
+    read = read_views(turnaround(front, side, back), size=size).views
     for view in range(3):
         extents = []
         for images in (read.images, character.sources.images):

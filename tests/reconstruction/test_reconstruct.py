@@ -11,7 +11,8 @@ import torch
 import trimesh
 from PIL import Image, ImageDraw
 
-from charnerf.drawings.turnaround import read_turnaround
+from charnerf.drawings.turnaround import read_views
+from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.hull import build_hull
 from charnerf.inference.model import Hero
@@ -43,8 +44,8 @@ class FakeModel:
         self.density = density
 
     def encode(self, *, front, side, back, side_is) -> Hero:
-        turnaround = read_turnaround(front, side, back, size=64, side_is=side_is)
-        hull = build_hull(turnaround.views, box_min=BOX[0], box_max=BOX[1], grid_size=32)[0]
+        read = read_views(turnaround(front, side, back, side_is=side_is), size=64)
+        hull = build_hull(read.views, box_min=BOX[0], box_max=BOX[1], grid_size=32)[0]
 
         def field(points, view_dirs):
             output = _egg(points, view_dirs)
@@ -53,7 +54,7 @@ class FakeModel:
         renderer = CulledRenderer(
             quadrature=PiecewiseConstant(), num_coarse=24, num_fine=0, hull_steps=64, memory_mib=64
         )
-        return Hero(Scene(field, None, hull, *BOX, False), turnaround.views, renderer, turnaround)
+        return Hero(Scene(field, None, hull, *BOX, False), read.views, renderer, read)
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
-"""Three drawings to source views: what was assumed is said in sentences and drawn in a picture."""
+"""Drawings of one character to source views: what was assumed and mended is told in sentences and drawn in a picture."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +12,17 @@ from charnerf.drawings.align import FigureBox, figure_box, half_extent, place
 from charnerf.drawings.cutout import Cutout, cut_out
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.picture import draw_assumptions
+from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
-from charnerf.geometry.framing import HEIGHT, SOURCE_AZIMUTHS, source_cameras
+from charnerf.geometry.cameras import direction_from_angles
+from charnerf.geometry.framing import HEIGHT, framing_cameras
+from charnerf.reconciling import Reconciliation, reconcile
 from charnerf.types import SourceViews
 
-SIDES = {"left": 90.0, "right": 270.0}  # azimuth of the camera that a side drawing stands for
-LEAST_AGREEMENT = 0.85  # IoU of the back's silhouette with the mirrored front's
+Picture = str | Path | np.ndarray
+LEAST_AGREEMENT = 0.85  # IoU of two outlines that ought to be one; below, the user is warned
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
+NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 
 
 @dataclass(frozen=True)
@@ -24,10 +30,11 @@ class Turnaround:
     """Drawings made ready for the model.
 
     Attributes:
-        views: B = 1, V in the order front, side, back: orthographic, S x S.
-        names: What each view is: "front", "side", "back".
+        views: B = 1, V in the order given: orthographic, S x S, reconciled.
+        names: What each view is: "front", "left", "back", "45 degrees".
         detailed: The same views with as many pixels as the finest drawing has, within DETAIL; for textures.
         half_extent: Half the canvas' side, m.
+        reconciliation: How the views agree, and what was moved.
         assumptions: What was done and assumed, plain sentences.
         warnings: What looks wrong, plain sentences.
         picture: RGB uint8 contact sheet: outlines, height line and floor line drawn into the aligned figures.
@@ -37,6 +44,7 @@ class Turnaround:
     detailed: SourceViews
     names: tuple[str, ...]
     half_extent: float
+    reconciliation: Reconciliation
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
     picture: np.ndarray
@@ -46,115 +54,132 @@ class Turnaround:
 class _Figure:
     """One figure on its way."""
 
-    view: str
+    viewpoint: Viewpoint
     drawing: Drawing
     cutout: Cutout
     box: FigureBox
 
 
-def read_turnaround(
-    front: str | Path | np.ndarray,
-    side: str | Path | np.ndarray,
-    back: str | Path | np.ndarray,
-    *,
-    size: int,
-    side_is: str = "left",
-) -> Turnaround:
-    """Read, cut out and align three drawings of one character.
+def read_views(drawings: Mapping[Viewpoint, Picture], *, size: int, reconciled: bool = True) -> Turnaround:
+    """Read, cut out, align and reconcile drawings of one character.
 
     Args:
-        front: Picture file or array (H, W, 3 or 4): the character faces the viewer.
-        side: The character in profile.
-        back: Seen from behind.
+        drawings: Picture files or arrays (H, W, 3 or 4) by where they are seen from; where they disagree, the first rules.
         size: S, side of the model's source pictures, pixels.
-        side_is: "left": the character's left side is seen, it looks towards the picture's left (azimuth 90).
-            "right": its right side, it looks towards the picture's right (azimuth 270); the drawing is kept
-            as it is and its camera moved.
+        reconciled: Whether views that disagree are mended; else they are only compared.
 
     Raises:
-        DataError: If a drawing can not be used; the message names its file.
+        DataError: If there are fewer than two, two show one view, or one can not be used; the message names its file.
     """
-    if side_is not in SIDES:
-        raise DataError(
-            f"side: found '{side_is}', expected 'left' or 'right': which side of the character is drawn."
-        )
     if size < 16:
         raise DataError(f"size: found {size}, expected at least 16 pixels.")
-    given = {"front": front, "side": side, "back": back}
-    figures = [_prepare(view, source) for view, source in given.items()]
+    _check_viewpoints(drawings)
+    figures = [_prepare(viewpoint, source) for viewpoint, source in drawings.items()]
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
-    canvases = _canvases(figures, extent, size)
-    azimuths = [*{**SOURCE_AZIMUTHS, "side": SIDES[side_is]}.values()]
-    assumptions, warnings = _told(figures, extent, size, side_is)
-    warnings += _check_back(canvases[0][..., 3], canvases[2][..., 3], figures[2].drawing.name)
+    given = _canvases(figures, extent, size)
+    agreement = reconcile(given, [figure.viewpoint.azimuth_deg for figure in figures])
     finest = max(round(2.0 * extent * figure.box.height / HEIGHT) for figure in figures)
     detail = min(max(finest, DETAIL[0], size), max(DETAIL[1], size))
+    canvases, detailed = given, _canvases(figures, extent, detail)
+    if reconciled:
+        canvases, detailed = agreement.apply(canvases), agreement.apply(detailed)
+    names = tuple(figure.viewpoint.name for figure in figures)
     return Turnaround(
-        views=_source_views(canvases, azimuths, extent),
-        detailed=_source_views(_canvases(figures, extent, detail), azimuths, extent),
-        names=tuple(given),
+        views=_source_views(canvases, figures, extent),
+        detailed=_source_views(detailed, figures, extent),
+        names=names,
         half_extent=extent,
-        assumptions=tuple(assumptions),
-        warnings=tuple(warnings),
+        reconciliation=agreement,
+        assumptions=(*_assumptions(figures, extent, size), *_mended(agreement, names, reconciled)),
+        warnings=(*_small_figures(figures, extent, size), *_disagreements(agreement, figures)),
         picture=draw_assumptions(
-            canvases, [f.view for f in figures], [f.drawing.name for f in figures], extent
+            given, canvases, list(names), [figure.drawing.name for figure in figures], extent
         ),
     )
 
 
-def _canvases(figures: list[_Figure], extent: float, size: int) -> list[np.ndarray]:
+def _check_viewpoints(drawings: Mapping[Viewpoint, Picture]) -> None:
+    if len(drawings) < 2:
+        raise DataError(
+            f"drawings: found {len(drawings)}, expected at least two, such as front and side: from one drawing alone no depth"
+            " can be told."
+        )
+    azimuths = sorted(one.azimuth_deg for one in drawings)
+    for first, second in pairwise([*azimuths, azimuths[0] + 360.0]):
+        if second - first < NEAR:
+            raise DataError(
+                f"view {first:g}: found two drawings from this azimuth, expected one from each; leave one out, or say where it"
+                " is seen from."
+            )
+    files = [str(source) for source in drawings.values() if not isinstance(source, np.ndarray)]
+    for file in files:
+        if files.count(file) > 1:
+            raise DataError(f"{file}: given for two views, expected another drawing for each.")
+
+
+def _canvases(figures: Sequence[_Figure], extent: float, size: int) -> list[np.ndarray]:
     """The figures on canvases (S, S, 4) of a size."""
     return [place(figure.cutout.rgba, figure.box, extent=extent, size=size) for figure in figures]
 
 
-def _source_views(canvases: list[np.ndarray], azimuths_deg: list[float], extent: float) -> SourceViews:
+def _source_views(canvases: Sequence[np.ndarray], figures: Sequence[_Figure], extent: float) -> SourceViews:
     """Canvases with their cameras, B = 1."""
     flags = torch.zeros(1, len(canvases), dtype=torch.bool)
     images = torch.from_numpy(np.stack(canvases)).permute(0, 3, 1, 2)[None].contiguous()
-    cameras = source_cameras(azimuths_deg, radius=extent, size=images.shape[-1]).to(torch.float32)
-    return SourceViews(images=images, cameras=cameras[None], present=~flags, mirrored=flags.clone())
+    angles = torch.tensor(
+        [(one.viewpoint.azimuth_deg, one.viewpoint.elevation_deg) for one in figures], dtype=torch.float64
+    )
+    directions = direction_from_angles(angles[:, 0], angles[:, 1])
+    cameras = framing_cameras(directions, radius=extent, size=images.shape[-1], orthographic=True)
+    return SourceViews(
+        images=images, cameras=cameras.to(torch.float32)[None], present=~flags, mirrored=flags.clone()
+    )
 
 
-def _prepare(view: str, source: str | Path | np.ndarray) -> _Figure:
+def _prepare(viewpoint: Viewpoint, source: Picture) -> _Figure:
     """Read and cut out one drawing."""
     if isinstance(source, np.ndarray):
-        drawing = drawing_from_array(source, f"the {view} drawing")
+        drawing = drawing_from_array(source, f"the {viewpoint.name} drawing")
     else:
         drawing = load_drawing(source)
     cutout = cut_out(drawing)
-    return _Figure(view, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
+    return _Figure(viewpoint, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
 
 
-def _told(figures: list[_Figure], extent: float, size: int, side_is: str) -> tuple[list[str], list[str]]:
-    """What was done, and what looks wrong in single drawings."""
-    told, warnings = [], []
+def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
+    """What was done to single drawings."""
+    lines = []
     for figure in figures:
         width, height = figure.drawing.size
-        told.append(
-            f"{figure.view} ({figure.drawing.name}, {width} x {height} pixels): "
+        lines.append(
+            f"{figure.viewpoint.name} ({figure.drawing.name}, {width} x {height} pixels): "
             f"{'; '.join(figure.cutout.notes)}."
         )
-        pixels = figure.box.height * 2.0 * extent / HEIGHT
-        if pixels < 0.5 * size:
-            warnings.append(
-                f"{figure.drawing.name}: the figure is {figure.box.height:.0f} pixels tall, fewer than the "
-                "model reads: use a larger picture."
-            )
     heights = ", ".join(
-        f"{figure.view} {figure.box.height * _shrunk(figure.drawing):.0f}" for figure in figures
+        f"{figure.viewpoint.name} {figure.box.height * _shrunk(figure.drawing):.0f}" for figure in figures
     )
-    told.append(f"The figures' heights ({heights} pixels) were taken as one and the same, {HEIGHT:g} m.")
-    told.append(
+    lines.append(f"The figures' heights ({heights} pixels) were taken as one and the same, {HEIGHT:g} m.")
+    lines.append(
         "The lowest point of each figure was put on the floor line, the middle of its width on the axis."
     )
-    told.append(f"The pictures show {2 * extent:.2f} m a side without perspective, {size} x {size} pixels.")
-    looks = "left" if side_is == "left" else "right"
-    told.append(
-        f"The side drawing was taken as the character's {side_is} side: it looks towards the picture's "
-        f"{looks}. "
-        f"If it looks the other way, say --side {'right' if side_is == 'left' else 'left'}."
-    )
-    return told, warnings
+    lines.append(f"The pictures show {2 * extent:.2f} m a side without perspective, {size} x {size} pixels.")
+    for figure in figures:
+        if figure.viewpoint.name in ("left", "right"):
+            side, other = ("left", "right") if figure.viewpoint.name == "left" else ("right", "left")
+            lines.append(
+                f"The side drawing was taken as the character's {side} side: it looks towards the picture's {side}. If it"
+                f" looks the other way, say --side {other}."
+            )
+    return lines
+
+
+def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
+    return [
+        f"{figure.drawing.name}: the figure is {figure.box.height:.0f} pixels tall, fewer than the model reads: use a larger"
+        " picture."
+        for figure in figures
+        if figure.box.height * 2.0 * extent / HEIGHT < 0.5 * size
+    ]
 
 
 def _shrunk(drawing: Drawing) -> float:
@@ -162,27 +187,51 @@ def _shrunk(drawing: Drawing) -> float:
     return drawing.size[1] / drawing.rgba.shape[0]
 
 
-def _check_back(front: np.ndarray, back: np.ndarray, name: str) -> list[str]:
-    """Compare the back's silhouette with the front's, mirrored as it should be and not."""
-    mirrored, plain = silhouette_iou(front[:, ::-1], back), silhouette_iou(front, back)
-    warnings = []
-    if mirrored < LEAST_AGREEMENT:
-        warnings.append(
-            f"{name}: the back's silhouette covers only {100 * mirrored:.0f} % of what it shares with the "
-            "mirrored front's "
-            f"(IoU, expected {100 * LEAST_AGREEMENT:.0f} % or more): the drawings differ in pose or are not "
-            "of one character."
-        )
-    if plain > mirrored + 0.02:
-        warnings.append(
-            f"{name}: the back fits the front better unmirrored (IoU {plain:.2f} against {mirrored:.2f}): a "
-            "view from behind "
-            "shows left and right swapped. Was the front traced? Mirror the back drawing if so."
-        )
-    return warnings
+def _mended(agreement: Reconciliation, names: Sequence[str], reconciled: bool) -> list[str]:
+    """What was moved so that the views agree."""
+    lines = []
+    for name, view in zip(names, agreement.views, strict=True):
+        if not view.is_mended or not reconciled:
+            continue
+        if view.partner is not None:
+            lines.append(
+                f"{name}: {100 * view.apart_before:.1f} % of its outline disagreed with the mirrored {names[view.partner]}'s (IoU"
+                f" {view.iou_before:.2f}); it was moved there smoothly (IoU {view.iou_after:.2f}) and takes its outline."
+            )
+        else:
+            lines.append(
+                f"{name}: rows were moved by up to {100 * view.rows_moved:.1f} % of the picture's side to the heights of the"
+                f" {names[0]}."
+            )
+    return lines
 
 
-def silhouette_iou(first: np.ndarray, second: np.ndarray) -> float:
-    """Intersection over union of two alphas (H, W) at one half; 0 where both are empty."""
-    union = int(((first > 0.5) | (second > 0.5)).sum())
-    return int(((first > 0.5) & (second > 0.5)).sum()) / union if union else 0.0
+def _disagreements(agreement: Reconciliation, figures: Sequence[_Figure]) -> list[str]:
+    """What looks wrong between drawings."""
+    lines = []
+    for figure, view in zip(figures, agreement.views, strict=True):
+        name = figure.drawing.name
+        if view.copies is not None:
+            first = figures[view.copies]
+            lines.append(
+                f"{name}: shows the same as {first.drawing.name}: was one file used twice? Give the {figure.viewpoint.name} view,"
+                " or leave it out."
+            )
+        elif view.partner is not None and view.iou_unmirrored > view.iou_before + 0.02:
+            lines.append(
+                f"{name}: the {figure.viewpoint.name} fits the {figures[view.partner].viewpoint.name} better unmirrored (IoU"
+                f" {view.iou_unmirrored:.2f} against {view.iou_before:.2f}): seen from the other side, left and right are swapped."
+                " Was it traced? Mirror the drawing if so."
+            )
+        if view.partner is not None and view.iou_before < LEAST_AGREEMENT:
+            lines.append(
+                f"{name}: its outline shares only {100 * view.iou_before:.0f} % with the mirrored"
+                f" {figures[view.partner].viewpoint.name}'s (IoU, expected {100 * LEAST_AGREEMENT:.0f} % or more): the drawings"
+                f" differ in pose or are not of one character"
+                + ("." if view.is_trusted else "; it could not be reconciled, colours may be misplaced.")
+            )
+        if np.isinf(view.tolerance).all():
+            lines.append(
+                f"{name}: fits none of the views before it; it colours the figure but does not shape it."
+            )
+    return lines

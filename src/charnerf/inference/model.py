@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 import torch
 
-from charnerf.drawings.turnaround import Turnaround, read_turnaround
+from charnerf.drawings.turnaround import Turnaround, read_views
+from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import ConfigError, ShapeError
 from charnerf.geometry.framing import CENTRE, HEIGHT, framing_camera, framing_radius
 from charnerf.geometry.resizing import resized_views
@@ -87,9 +88,9 @@ class Model:
         Raises:
             DataError: If a drawing can not be used; the message names its file.
         """
-        turnaround = read_turnaround(front, side, back, size=self.image_size, side_is=side_is)
-        hero = self.encode_views(turnaround.views, detailed=turnaround.detailed)
-        return replace(hero, turnaround=turnaround)
+        read = read_views(turnaround(front, side, back, side_is=side_is), size=self.image_size)
+        hero = self.encode_views(read.views, detailed=read.detailed)
+        return replace(hero, turnaround=read)
 
     def encode_views(self, views: SourceViews, *, detailed: SourceViews | None = None) -> Hero:
         """Encode source views of one character, B = 1, that have their cameras already.

@@ -1,0 +1,99 @@
+"""From where a drawing shows its character: names that artists use, and angles."""
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+from charnerf.errors import DataError
+
+Drawn = TypeVar("Drawn")
+
+AZIMUTHS = {
+    "front": 0.0,
+    "three-quarter-front": 45.0,
+    "left": 90.0,
+    "three-quarter-back": 135.0,
+    "back": 180.0,
+    "three-quarter-back-right": 225.0,
+    "right": 270.0,
+    "three-quarter-front-right": 315.0,
+}
+"""Degrees, 0 the front, 90 the character's left side, by name; three-quarter views show the left side unless they say right."""
+
+HIGHEST = 80.0  # degrees of elevation: from straight above a figure has no floor line
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """Where a drawing's viewer stands.
+
+    Attributes:
+        azimuth_deg: In [0, 360): 0 sees the front, 90 the character's left side, 180 the back.
+        elevation_deg: 0 level, positive from above.
+    """
+
+    azimuth_deg: float
+    elevation_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Bring the azimuth into [0, 360).
+
+        Raises:
+            DataError: If an angle is not finite or the elevation too steep.
+        """
+        if not math.isfinite(self.azimuth_deg) or not abs(self.elevation_deg) <= HIGHEST:
+            raise DataError(
+                f"view: found azimuth {self.azimuth_deg}, elevation {self.elevation_deg}, expected finite degrees and an"
+                f" elevation within {HIGHEST:g}."
+            )
+        object.__setattr__(self, "azimuth_deg", float(self.azimuth_deg) % 360.0)
+        object.__setattr__(self, "elevation_deg", float(self.elevation_deg))
+
+    @property
+    def name(self) -> str:
+        """Its name where it has one, else its angles."""
+        if self.elevation_deg == 0.0:
+            for name, azimuth in AZIMUTHS.items():
+                if azimuth == self.azimuth_deg:
+                    return name
+            return f"{self.azimuth_deg:g} degrees"
+        return f"{self.azimuth_deg:g},{self.elevation_deg:g} degrees"
+
+
+def viewpoint(text: str | float) -> Viewpoint:
+    """Read a name such as `left`, an azimuth such as 45, or azimuth and elevation such as `45,20`.
+
+    Raises:
+        DataError: If it is none of them.
+    """
+    if isinstance(text, str) and text in AZIMUTHS:
+        return Viewpoint(AZIMUTHS[text])
+    try:
+        numbers = [float(part) for part in str(text).split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 2):
+        raise DataError(
+            f"view: found '{text}', expected one of {', '.join(AZIMUTHS)}, an azimuth in degrees such as 45, or azimuth and"
+            " elevation such as 45,20."
+        )
+    return Viewpoint(*numbers)
+
+
+def turnaround(front: Drawn, side: Drawn, back: Drawn, *, side_is: str = "left") -> dict[Viewpoint, Drawn]:
+    """Three drawings by where they are seen from.
+
+    Args:
+        front: The character faces the viewer.
+        side: In profile.
+        back: Seen from behind.
+        side_is: "left": the character's left side is seen, it looks towards the picture's left. "right": its right side.
+
+    Raises:
+        DataError: If the side is another one.
+    """
+    if side_is not in ("left", "right"):
+        raise DataError(
+            f"side: found '{side_is}', expected 'left' or 'right': which side of the character is drawn."
+        )
+    return {viewpoint("front"): front, viewpoint(side_is): side, viewpoint("back"): back}
