@@ -103,6 +103,15 @@ def test_rooms_import_downward_only(file: Path) -> None:
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_the_generator_has_one_face(file: Path) -> None:
+    """Other rooms import what `charnerf.procedural` itself names, nothing inside."""
+    inside = [name for _, name in imports_of(file) if name.startswith("charnerf.procedural.")]
+    assert room_of(file) == "procedural" or not inside, (
+        f"{file}: imports {inside}, expected charnerf.procedural"
+    )
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
 def test_frameworks_stay_in_their_rooms(file: Path) -> None:
     module = file.relative_to(PACKAGE).with_suffix("").as_posix()
     for line, name in imports_of(file):

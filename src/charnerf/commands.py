@@ -368,7 +368,7 @@ def _checked_character(model: Model, data: Path | None, character: str | None) -
         known = load_character(data, character or names[0])
         return known.sources, _small(known.cameras[0])
     from charnerf.capture.embree import capture_character
-    from charnerf.procedural.character import make_character
+    from charnerf.procedural import make_character
 
     options = CaptureOptions(views=3, size=model.image_size, light=Unlit())
     pictures = capture_character(make_character(CHECKED_SEED), options).pictures

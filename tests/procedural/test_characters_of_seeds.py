@@ -41,8 +41,8 @@ def test_equal_seeds_give_equal_characters(seed):
 
 def test_different_seeds_give_different_characters(characters):
     shapes = {vertices_of(parts).tobytes() for parts in characters.values()}
-    colours = {b"".join(part.texels.tobytes() for part in parts) for parts in characters.values()}
-    assert len(shapes) == len(colours) == len(SEEDS)
+    colors = {b"".join(part.texels.tobytes() for part in parts) for parts in characters.values()}
+    assert len(shapes) == len(colors) == len(SEEDS)
 
 
 def test_parts_are_closed_and_turned_outwards(characters):
@@ -105,7 +105,7 @@ def test_scene_has_one_texture_and_sane_coordinates(characters):
             assert len(mesh.visual.uv) == len(mesh.vertices)
 
 
-def test_flat_colours_survive_the_atlas_exactly(characters):
+def test_flat_colors_survive_the_atlas_exactly(characters):
     for seed in SEEDS[:5]:
         parts, scene = characters[seed], assemble(characters[seed])
         for name, mesh in scene.geometry.items():
@@ -115,7 +115,7 @@ def test_flat_colours_survive_the_atlas_exactly(characters):
             picture = np.asarray(mesh.visual.material.baseColorTexture)
             x = (mesh.visual.uv[:, 0] * picture.shape[1]).astype(int)
             y = ((1.0 - mesh.visual.uv[:, 1]) * picture.shape[0]).astype(int)
-            assert {bytes(colour) for colour in picture[y, x]} == texels
+            assert {bytes(color) for color in picture[y, x]} == texels
 
 
 def test_fronts_are_unlike_backs(characters):
@@ -124,7 +124,7 @@ def test_fronts_are_unlike_backs(characters):
     for seed in SEEDS[:8]:
         surface = surface_of_scene(assemble(characters[seed]))
         caster = RayCaster.of_surface(surface)
-        colours = []
+        colors = []
         for side in (-1.0, 1.0):
             origins = np.stack((x.ravel(), np.full(x.size, 4.0 * side), z.ravel()), axis=-1)
             directions = np.broadcast_to((0.0, -side, 0.0), origins.shape)
@@ -132,9 +132,9 @@ def test_fronts_are_unlike_backs(characters):
             seen = hits.triangles >= 0
             picture = np.ones((x.size, 3))
             picture[seen] = shade(surface, hits.triangles[seen], hits.u[seen], hits.v[seen])[:, :3]
-            colours.append(picture)
-        inside = (colours[0] < 1.0).any(axis=-1) | (colours[1] < 1.0).any(axis=-1)
-        differences.append(np.abs(colours[0] - colours[1])[inside].mean())
+            colors.append(picture)
+        inside = (colors[0] < 1.0).any(axis=-1) | (colors[1] < 1.0).any(axis=-1)
+        differences.append(np.abs(colors[0] - colors[1])[inside].mean())
     assert np.mean(differences) > 0.03
     assert min(differences) > 0.002
 

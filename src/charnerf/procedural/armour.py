@@ -14,7 +14,7 @@ from charnerf.procedural.shapes import (
 )
 from charnerf.procedural.textures import (
     NUM_EMBLEMS,
-    Colour,
+    Color,
     add_emblem,
     darker,
 )
@@ -23,7 +23,7 @@ from charnerf.procedural.textures import (
 def _limb_shell(
     figure: Figure,
     name: str,
-    colour: Colour,
+    color: Color,
     *,
     span: tuple[float, float],
     flare: tuple[float, float],
@@ -36,18 +36,18 @@ def _limb_shell(
     )
     shares = np.linspace(span[0], span[1], 4)
     sizes = np.interp(shares, known, radii) * np.linspace(flare[0], flare[1], 4) + 0.006
-    return flat(name, body.limb(points, shares, sizes, figure), colour)
+    return flat(name, body.limb(points, shares, sizes, figure), color)
 
 
 def make_boots(figure: Figure) -> list[Part]:
     """Boots or greaves around the lower legs."""
     start = figure.between(0.5, 0.85)
-    colour = figure.palette.metal if figure.chance(0.2) else figure.palette.boots
+    color = figure.palette.metal if figure.chance(0.2) else figure.palette.boots
     parts = []
     rim = figure.chance(0.4)
     flare = (figure.between(1.12, 1.4), 1.15)
     for name in ("left_boot", "right_boot"):
-        parts.append(_limb_shell(figure, name, colour, span=(start, 1.0), flare=flare))
+        parts.append(_limb_shell(figure, name, color, span=(start, 1.0), flare=flare))
         if rim:
             wide = (flare[0] * 1.1, flare[0] * 1.1)
             top = (start - 0.02, start + 0.05)
@@ -59,7 +59,7 @@ def make_bracers(figure: Figure) -> list[Part]:
     """Bracers, gauntlets or wide sleeves around the forearms; at times on one arm only."""
     parts = []
     sleeve = figure.chance(0.35)
-    colour = (
+    color = (
         figure.palette.main
         if sleeve
         else (figure.palette.metal if figure.chance(0.4) else figure.palette.leather)
@@ -68,14 +68,14 @@ def make_bracers(figure: Figure) -> list[Part]:
     flare = (1.1, figure.between(1.5, 2.6)) if sleeve else (figure.between(1.15, 1.5), 1.2)
     only_left = figure.chance(0.15)
     for name in ("left_bracer",) if only_left else ("left_bracer", "right_bracer"):
-        parts.append(_limb_shell(figure, name, colour, span=(start, 0.98), flare=flare))
+        parts.append(_limb_shell(figure, name, color, span=(start, 0.98), flare=flare))
     return parts
 
 
 def make_pauldrons(figure: Figure) -> list[Part]:
     """Shoulder plates: domes, layers, spikes; at times on one side only."""
     build, parts = figure.build, []
-    colour = figure.palette.metal if figure.chance(0.7) else figure.palette.leather
+    color = figure.palette.metal if figure.chance(0.7) else figure.palette.leather
     grow, layers, spike = figure.between(1.35, 2.0), int(figure.rng.integers(1, 4)), figure.chance(0.25)
     sides = (True,) if figure.chance(0.25) else (True, False)
     for left in sides:
@@ -85,7 +85,7 @@ def make_pauldrons(figure: Figure) -> list[Part]:
         for layer in range(layers):
             size = build.arm_radius * grow * (1.0 - 0.12 * layer)
             at = points[0] + along * build.arm_radius * (0.15 + 0.75 * layer) + up * build.arm_radius * 0.25
-            shade = darker(colour, 1.0 - 0.14 * layer)
+            shade = darker(color, 1.0 - 0.14 * layer)
             dome = ball(
                 at, (size, size, 0.85 * size), sides=8, rings=6, power=2.0 if not figure.crisp else 3.5
             )
@@ -104,13 +104,13 @@ def make_breastplate(figure: Figure) -> list[Part]:
     """A plate or a vest around the chest, painted with edges and an emblem in front."""
     palette = figure.palette
     low, high = figure.between(0.3, 0.5), figure.between(0.86, 0.95)
-    colour = palette.metal if figure.chance(0.65) else palette.leather
-    canvas = body.trunk_canvas(figure, colour, low=low, high=high)
-    edge = darker(colour, 0.65) if figure.chance(0.6) else palette.accent
+    color = palette.metal if figure.chance(0.65) else palette.leather
+    canvas = body.trunk_canvas(figure, color, low=low, high=high)
+    edge = darker(color, 0.65) if figure.chance(0.6) else palette.accent
     canvas.band(0.0, 0.1, edge)
     canvas.band(0.92, 1.0, edge)
     if figure.chance(0.5):
-        canvas.strip(0.5, 0.008, darker(colour, 0.75))
+        canvas.strip(0.5, 0.008, darker(color, 0.75))
     if figure.chance(0.4):
         half = 0.35 * figure.build.waist
         add_emblem(canvas, (0.5, 0.6), half, int(figure.rng.integers(NUM_EMBLEMS)), palette.accent)
@@ -123,12 +123,12 @@ def make_breastplate(figure: Figure) -> list[Part]:
 def make_robot_joints(figure: Figure) -> list[Part]:
     """Balls at a robot's shoulders, elbows and knees."""
     parts = []
-    build, colour = figure.build, darker(figure.palette.metal, figure.between(0.6, 1.0))
+    build, color = figure.build, darker(figure.palette.metal, figure.between(0.6, 1.0))
     for left in (True, False):
         arm, leg = build.arm_points(left), build.leg_points(left)
         for point, radius in ((arm[0], 1.3), (arm[1], 1.08)):
-            parts.append(flat("joints", ball(point, radius * build.arm_radius, sides=8, rings=6), colour))
-        parts.append(flat("joints", ball(leg[1], 1.0 * build.leg_radius, sides=8, rings=6), colour))
+            parts.append(flat("joints", ball(point, radius * build.arm_radius, sides=8, rings=6), color))
+        parts.append(flat("joints", ball(leg[1], 1.0 * build.leg_radius, sides=8, rings=6), color))
     return parts
 
 

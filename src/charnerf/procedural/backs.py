@@ -32,14 +32,14 @@ def make_backpack(figure: Figure) -> list[Part]:
     back = centre + np.array((0.0, half[1], 0.0))
     size = figure.build.waist * figure.between(0.55, 0.95)
     if kind == "pack":
-        colour = palette.leather if figure.chance(0.5) else palette.accent
+        color = palette.leather if figure.chance(0.5) else palette.accent
         deep = figure.between(0.07, 0.14)
         pack = ball(
             back + np.array((0.0, 0.8 * deep, 0.0)), (size, deep, 1.15 * size), sides=8, rings=6, power=4.0
         )
-        parts += [flat("backpack", pack, colour)]
+        parts += [flat("backpack", pack, color)]
         pocket = box(back + np.array((0.0, 1.9 * deep, -0.35 * size)), (0.65 * size, 0.3 * deep, 0.35 * size))
-        parts.append(flat("backpack", pocket, darker(colour, 0.75)))
+        parts.append(flat("backpack", pocket, darker(color, 0.75)))
         if figure.chance(0.5):
             roll = np.stack(
                 (back + np.array((-size, deep, 1.3 * size)), back + np.array((size, deep, 1.3 * size)))
@@ -169,10 +169,10 @@ def make_wings(figure: Figure) -> list[Part]:
     kind = figure.choose("bat", "feather", "insect")
     centre, half = figure.trunk(0.75)
     size = figure.between(0.4, 0.75)
-    colour = WHITE if kind == "feather" and figure.chance(0.5) else figure.palette.accent
-    canvas = Canvas(size, size, colour)
+    color = WHITE if kind == "feather" and figure.chance(0.5) else figure.palette.accent
+    canvas = Canvas(size, size, color)
     if figure.chance(0.5):
-        add_pattern(canvas, figure.rng, darker(colour, 0.75))
+        add_pattern(canvas, figure.rng, darker(color, 0.75))
     sweep = np.deg2rad(figure.between(10.0, 55.0))
     shape = slab(_wing_outline(kind) * size, 0.02)
     turn = np.array(

@@ -5,7 +5,7 @@ import numpy as np
 from charnerf.procedural.figure import Figure
 from charnerf.procedural.parts import Part, flat
 from charnerf.procedural.shapes import FRONT, UP, Array, Shape, ball, box, loft, tube, unit
-from charnerf.procedural.textures import Canvas, Colour, darker
+from charnerf.procedural.textures import Canvas, Color, darker
 
 TRUNK_SHARES = (0.0, 0.06, 0.14, 0.28, 0.42, 0.56, 0.68, 0.79, 0.88, 0.95, 1.0)
 
@@ -25,11 +25,11 @@ def trunk_shape(figure: Figure, *, margin: float = 1.0, low: float = 0.0, high: 
     )
 
 
-def trunk_canvas(figure: Figure, colour: Colour, *, low: float = 0.0, high: float = 1.0) -> Canvas:
+def trunk_canvas(figure: Figure, color: Color, *, low: float = 0.0, high: float = 1.0) -> Canvas:
     """A canvas that fits trunk_shape between the same shares."""
     build = figure.build
     around = 4.0 * (build.waist + build.depth) if build.sides == 4 else 3.2 * (build.waist + build.depth)
-    return Canvas(around, (high - low) * (build.shoulder_height - figure.trunk_bottom), colour)
+    return Canvas(around, (high - low) * (build.shoulder_height - figure.trunk_bottom), color)
 
 
 def limb(points: Array, shares: Array, radii: Array, figure: Figure, *, front: Array = FRONT) -> Shape:
@@ -100,12 +100,12 @@ def make_legs(figure: Figure, canvases: tuple[Canvas, Canvas], loose: float) -> 
     return parts
 
 
-def limb_canvas(figure: Figure, colour: Colour, *, leg: bool) -> Canvas:
+def limb_canvas(figure: Figure, color: Color, *, leg: bool) -> Canvas:
     """A canvas that fits an arm or a leg."""
     build = figure.build
     if leg:
-        return Canvas(5.5 * build.leg_radius, build.hip_height - build.foot_height, colour)
-    return Canvas(5.5 * build.arm_radius, build.arm, colour)
+        return Canvas(5.5 * build.leg_radius, build.hip_height - build.foot_height, color)
+    return Canvas(5.5 * build.arm_radius, build.arm, color)
 
 
 def hand_frame(figure: Figure, left: bool) -> tuple[Array, Array, Array]:
@@ -115,7 +115,7 @@ def hand_frame(figure: Figure, left: bool) -> tuple[Array, Array, Array]:
     return points[2], direction, points[2] + 0.45 * figure.build.hand * direction
 
 
-def make_hands(figure: Figure, colour: Colour) -> list[Part]:
+def make_hands(figure: Figure, color: Color) -> list[Part]:
     """Mittens with a thumb, blocks, or hands with fingers."""
     build, parts = figure.build, []
     fingers = build.name == "realistic" or (build.name == "stylised" and figure.chance(0.5))
@@ -134,26 +134,26 @@ def make_hands(figure: Figure, colour: Colour) -> list[Part]:
         if style == "block":
             reach = np.array((0.0, 0.5, 0.98)) * size
             half = np.full((3, 2), (0.98 if build.sides == 4 else 0.85) * build.arm_radius)
-            parts.append(flat(name, loft(wrist + np.outer(reach, along), half, sides=4), colour))
+            parts.append(flat(name, loft(wrist + np.outer(reach, along), half, sides=4), color))
             continue
         if style == "ball":
-            parts.append(flat(name, ball(wrist + 0.5 * size * along, 0.62 * size, sides=8, rings=6), colour))
+            parts.append(flat(name, ball(wrist + 0.5 * size * along, 0.62 * size, sides=8, rings=6), color))
             continue
         reach = np.array((-0.12, 0.1, 0.55, 0.9)) * size
         half = np.array(((0.3, 0.5), (0.42, 0.85), (0.44, 1.0), (0.3, 0.85))) * width
         palm_end = 0.62 if style == "fingers" else 1.0
         parts.append(
-            flat(name, tube(wrist + np.outer(reach * palm_end, along), half, sides=8, power=2.6), colour)
+            flat(name, tube(wrist + np.outer(reach * palm_end, along), half, sides=8, power=2.6), color)
         )
         thumb_root = wrist + 0.25 * size * along + 0.8 * width * FRONT
         thumb = np.stack((thumb_root - 0.3 * width * FRONT, thumb_root + 0.3 * size * (along + FRONT)))
-        parts.append(flat(name, tube(thumb, np.array((0.24, 0.18)) * width, front=flatness, sides=6), colour))
+        parts.append(flat(name, tube(thumb, np.array((0.24, 0.18)) * width, front=flatness, sides=6), color))
         if style == "fingers":
             for offset in (-0.66, -0.22, 0.22, 0.66):
                 root = wrist + 0.45 * size * along + offset * width * FRONT
                 tip = root + size * (0.62 - 0.14 * abs(offset)) * along
                 parts.append(
-                    flat(name, tube(np.stack((root, tip)), np.array((0.21, 0.16)) * width, sides=6), colour)
+                    flat(name, tube(np.stack((root, tip)), np.array((0.21, 0.16)) * width, sides=6), color)
                 )
         if claws:
             for offset in (-0.5, 0.0, 0.5):
@@ -165,13 +165,13 @@ def make_hands(figure: Figure, colour: Colour) -> list[Part]:
     return parts
 
 
-def make_feet(figure: Figure, colour: Colour, *, bare: bool) -> list[Part]:
+def make_feet(figure: Figure, color: Color, *, bare: bool) -> list[Part]:
     """Shoes or bare feet: a loft from heel to toe, with a sole if shod."""
     build, parts = figure.build, []
     sole = figure.chance(0.55) and not bare
-    sole_colour = figure.palette.accent if figure.chance(0.25) else darker(colour, 0.55)
+    sole_color = figure.palette.accent if figure.chance(0.25) else darker(color, 0.55)
     if figure.chance(0.2):
-        sole_colour = np.array((0.9, 0.9, 0.88))
+        sole_color = np.array((0.9, 0.9, 0.88))
     toe = figure.between(0.7, 1.15)
     pointed = figure.between(0.5, 1.0)
     for left in (True, False):
@@ -187,7 +187,7 @@ def make_feet(figure: Figure, colour: Colour, *, bare: bool) -> list[Part]:
                 flat(
                     name,
                     box(middle, (1.03 * build.leg_radius, 1.15 * build.leg_radius, 0.5 * height)),
-                    colour,
+                    color,
                 )
             )
             continue
@@ -198,7 +198,7 @@ def make_feet(figure: Figure, colour: Colour, *, bare: bool) -> list[Part]:
         shape = loft(
             path, np.stack((wide, tall), axis=-1), front=UP, axis=FRONT, sides=max(build.sides, 8), power=3.0
         )
-        parts.append(flat(name, shape, colour))
+        parts.append(flat(name, shape, color))
         if sole:
             span = np.array((-1.05 * back, -0.5 * back, 0.5 * front, 0.92 * front, 1.06 * front))
             width = half * np.array((0.7, 1.02, 1.15 * toe, 1.0 * toe * pointed + 0.05, 0.4))
@@ -206,11 +206,11 @@ def make_feet(figure: Figure, colour: Colour, *, bare: bool) -> list[Part]:
             plate = loft(
                 path, np.stack((width, np.full(5, 0.018)), axis=-1), front=UP, axis=FRONT, sides=8, power=5.0
             )
-            parts.append(flat(name, plate, sole_colour))
+            parts.append(flat(name, plate, sole_color))
     return parts
 
 
-def make_neck(figure: Figure, colour: Colour) -> list[Part]:
+def make_neck(figure: Figure, color: Color) -> list[Part]:
     """A short tube between trunk and head."""
     build = figure.build
     if build.name == "blocky":
@@ -221,4 +221,4 @@ def make_neck(figure: Figure, colour: Colour) -> list[Part]:
     bottom, _ = figure.trunk(0.93)
     top = build.head_centre + np.array((0.0, 0.12 * build.head_depth, -0.3 * build.head))
     shape = loft(np.stack((bottom, 0.5 * (bottom + top), top)), np.array((1.15, 1.0, 1.0)) * radius, sides=8)
-    return [flat("neck", shape, colour)]
+    return [flat("neck", shape, color)]

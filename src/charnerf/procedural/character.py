@@ -13,6 +13,7 @@ from charnerf.procedural.outfit import Outfit, make_outfit
 from charnerf.procedural.parts import Part, assemble, pixelated, to_world
 from charnerf.procedural.voxels import make_voxel_parts
 
+GENERATOR_VERSION = 2  # raise it whenever the characters of a seed change: caches are named after it
 VOXEL_SHARE = 0.09
 
 

@@ -27,8 +27,8 @@ def make_belt(figure: Figure) -> list[Part]:
     """A belt with a buckle, pouches at times."""
     palette = figure.palette
     low = figure.between(0.14, 0.24)
-    colour = palette.leather if figure.chance(0.75) else palette.second
-    parts = [flat("belt", body.trunk_shape(figure, margin=1.07, low=low, high=low + 0.07), colour)]
+    color = palette.leather if figure.chance(0.75) else palette.second
+    parts = [flat("belt", body.trunk_shape(figure, margin=1.07, low=low, high=low + 0.07), color)]
     centre, half = figure.trunk(low + 0.035, 1.08)
     size = 0.05 * (0.5 + figure.build.depth / 0.2)
     buckle = np.array((0.0, -half[1], 0.0)) + centre
@@ -43,9 +43,7 @@ def make_belt(figure: Figure) -> list[Part]:
         if figure.chance(0.3):
             pouch = centre + np.array((side * 0.75 * half[0], -0.72 * half[1], -0.04))
             parts.append(
-                flat(
-                    "belt", box(pouch, (1.1 * size, 0.7 * size, 1.2 * size), taper=0.9), darker(colour, 0.85)
-                )
+                flat("belt", box(pouch, (1.1 * size, 0.7 * size, 1.2 * size), taper=0.9), darker(color, 0.85))
             )
     return parts
 
@@ -67,13 +65,13 @@ def make_skirt(figure: Figure, outfit: Outfit) -> list[Part]:
     low_end = np.array((0.0, 0.0, bottom))
     rings += [(0.5 * (hips + low_end), 0.5 * (hip_half + end) * 1.02), (low_end, end)]
     rings.reverse()
-    colour = outfit.top if figure.chance(0.6) else palette.second
-    canvas = Canvas(3.0 * float(end.sum()), float(top[2] - bottom), colour)
+    color = outfit.top if figure.chance(0.6) else palette.second
+    canvas = Canvas(3.0 * float(end.sum()), float(top[2] - bottom), color)
     if figure.chance(0.35):
-        add_pattern(canvas, figure.rng, palette.second if figure.chance(0.5) else darker(colour, 0.75))
+        add_pattern(canvas, figure.rng, palette.second if figure.chance(0.5) else darker(color, 0.75))
     if figure.chance(0.5):
         canvas.band(
-            0.0, figure.between(0.06, 0.16), palette.accent if figure.chance(0.5) else darker(colour, 0.65)
+            0.0, figure.between(0.06, 0.16), palette.accent if figure.chance(0.5) else darker(color, 0.65)
         )
     opening = figure.choose("none", "none", "front", "apron", "back")
     if opening == "front":
@@ -114,10 +112,10 @@ def make_cape(figure: Figure) -> list[Part]:
     )
     z = top[2] + 0.02 - fall[:, None] * (top[2] - bottom) + 0.0 * columns
     grid = np.stack((x, y, z), axis=-1)[::-1]
-    colour = palette.accent if figure.chance(0.4) else palette.second
-    canvas = Canvas(2.0 * float(wide.max()), float(top[2] - bottom), colour)
+    color = palette.accent if figure.chance(0.4) else palette.second
+    canvas = Canvas(2.0 * float(wide.max()), float(top[2] - bottom), color)
     if figure.chance(0.25):
-        add_pattern(canvas, figure.rng, darker(colour, 0.7))
+        add_pattern(canvas, figure.rng, darker(color, 0.7))
     if figure.chance(0.45):
         canvas.band(0.0, 0.08, palette.main)
         canvas.paint((canvas.u < 0.06) | (canvas.u > 0.94), palette.main)
@@ -127,7 +125,7 @@ def make_cape(figure: Figure) -> list[Part]:
         )
     canvas.shade(1.0, figure.shade)
     collar = body.trunk_shape(figure, margin=1.18, low=0.85, high=0.98)
-    parts = [Part("cape", sheet(grid, 0.025), canvas.image()), flat("cape", collar, darker(colour, 0.85))]
+    parts = [Part("cape", sheet(grid, 0.025), canvas.image()), flat("cape", collar, darker(color, 0.85))]
     if figure.chance(0.5):
         clasp, size = figure.trunk(0.9, 1.2)
         parts.append(flat("cape", ball(clasp + size[1] * FRONT, 0.035, sides=8, rings=5), palette.metal))
@@ -137,12 +135,12 @@ def make_cape(figure: Figure) -> list[Part]:
 def make_scarf(figure: Figure) -> list[Part]:
     """A scarf or high collar, perhaps with a loose end."""
     build = figure.build
-    colour = figure.palette.accent if figure.chance(0.6) else figure.palette.second
+    color = figure.palette.accent if figure.chance(0.6) else figure.palette.second
     centre, _ = figure.trunk(0.98)
     wide = max(0.62 * build.head_width, 0.5 * build.waist)
     rings = np.outer((-0.05, 0.0, 0.06), UP) * (0.5 + build.head) + centre
     half = np.array((1.0, 1.12, 0.95))[:, None] * np.array((wide, min(0.9 * wide, 0.9 * build.depth + 0.03)))
-    parts = [flat("scarf", loft(rings, half, axis=UP, sides=10), colour)]
+    parts = [flat("scarf", loft(rings, half, axis=UP, sides=10), color)]
     if figure.chance(0.5):
         side = 0.4 * wide if figure.chance(0.5) else -0.4 * wide
         ahead = -1.0 if figure.chance(0.6) else 1.0
@@ -159,7 +157,7 @@ def make_scarf(figure: Figure) -> list[Part]:
             flat(
                 "scarf",
                 loft(path, np.array(((0.05, 0.025), (0.06, 0.02), (0.06, 0.02))), sides=4),
-                darker(colour, 0.85),
+                darker(color, 0.85),
             )
         )
     return parts
@@ -171,9 +169,9 @@ def make_tabard(figure: Figure) -> list[Part]:
     top, half = figure.trunk(0.22, 1.01)
     bottom = build.hip_height * figure.between(0.35, 0.75)
     wide = build.waist * figure.between(0.35, 0.7)
-    colour = palette.accent if figure.chance(0.5) else palette.main
+    color = palette.accent if figure.chance(0.5) else palette.main
     for ahead in (-1.0, 1.0) if figure.chance(0.6) else (-1.0,):
-        canvas = Canvas(2.0 * wide, float(top[2] - bottom), colour)
+        canvas = Canvas(2.0 * wide, float(top[2] - bottom), color)
         canvas.band(0.0, 0.12, palette.second)
         if ahead < 0.0 and figure.chance(0.5):
             add_emblem(canvas, (0.5, 0.5), 0.5 * wide, int(figure.rng.integers(NUM_EMBLEMS)), palette.second)

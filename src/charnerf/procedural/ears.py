@@ -83,7 +83,7 @@ def make_horns(figure: Figure, head: Head) -> list[Part]:
     long = build.head * figure.between(0.3, 0.7)
     thick = build.head_width * figure.between(0.1, 0.2)
     out, curl = figure.between(0.2, 1.0), figure.between(-0.4, 0.6)
-    colour = (
+    color = (
         figure.palette.metal
         if figure.surface == "robot"
         else mix(figure.palette.leather, (0.9, 0.85, 0.7), figure.between(0, 1))
@@ -94,7 +94,7 @@ def make_horns(figure: Figure, head: Head) -> list[Part]:
         bend = np.array((side * out, 0.0, 0.3)) * steps + np.array((-0.3 * side * out, -curl, 0.7)) * steps**2
         if figure.surface == "robot":
             parts.append(
-                flat("horns", tube(root + long * 0.6 * steps * UP, np.full(5, 0.4 * thick), sides=6), colour)
+                flat("horns", tube(root + long * 0.6 * steps * UP, np.full(5, 0.4 * thick), sides=6), color)
             )
             parts.append(
                 flat(
@@ -105,5 +105,5 @@ def make_horns(figure: Figure, head: Head) -> list[Part]:
             )
         else:
             radii = thick * np.array((1.0, 0.85, 0.65, 0.42, 0.1))
-            parts.append(flat("horns", loft(root + long * bend, radii, sides=7), colour))
+            parts.append(flat("horns", loft(root + long * bend, radii, sides=7), color))
     return parts

@@ -73,9 +73,7 @@ def _mouth(figure: Figure, canvas: Canvas, level: float) -> None:
 
 def _beard(figure: Figure, canvas: Canvas) -> None:
     """Stubble, moustache or beard in paint."""
-    colour = (
-        figure.palette.hair if figure.chance(0.6) else mix(figure.palette.skin, figure.palette.hair, 0.45)
-    )
+    color = figure.palette.hair if figure.chance(0.6) else mix(figure.palette.skin, figure.palette.hair, 0.45)
     x, y = canvas.local(0.5, 0.0)
     x, y = np.abs(x) / figure.build.head_width, y / figure.build.head
     kind = figure.choose("full", "chin", "moustache", "stubble")
@@ -83,13 +81,13 @@ def _beard(figure: Figure, canvas: Canvas) -> None:
         mouth = (x < 0.25) & (np.abs(y - 0.22) < 0.03)
         canvas.paint(
             (y < 0.16 + 0.22 * np.clip(x, 0.0, 1.2)) & (x < 1.25) & ~mouth,
-            colour,
+            color,
             1.0 if kind == "full" else 0.5,
         )
     if kind in ("chin",):
-        canvas.paint((y < 0.14) & (x < 0.4), colour)
+        canvas.paint((y < 0.14) & (x < 0.4), color)
     if kind in ("moustache", "full"):
-        canvas.paint((np.abs(y - 0.28 + 0.1 * x) < 0.035) & (x < 0.45), colour)
+        canvas.paint((np.abs(y - 0.28 + 0.1 * x) < 0.035) & (x < 0.45), color)
 
 
 def paint_human_face(figure: Figure, canvas: Canvas) -> None:

@@ -25,13 +25,13 @@ class Hair:
 
 def _strands(figure: Figure, shape: Shape, name: str = "hair") -> Part:
     """A shape painted with upright strands of hair."""
-    colour = figure.palette.hair
-    canvas = Canvas(2.0 * np.pi * figure.build.head_width, figure.build.head, colour)
+    color = figure.palette.hair
+    canvas = Canvas(2.0 * np.pi * figure.build.head_width, figure.build.head, color)
     count = int(figure.rng.integers(8, 22))
     if figure.chance(0.5):
-        canvas.paint((canvas.u * count) % 1.0 < 0.35, darker(colour, figure.between(0.75, 0.92)))
+        canvas.paint((canvas.u * count) % 1.0 < 0.35, darker(color, figure.between(0.75, 0.92)))
     if figure.chance(0.15):
-        canvas.band(0.0, figure.between(0.15, 0.4), mix(colour, figure.palette.accent, 0.7))
+        canvas.band(0.0, figure.between(0.15, 0.4), mix(color, figure.palette.accent, 0.7))
     canvas.shade(1.05, figure.shade)
     return Part(name, shape, canvas.image())
 
@@ -53,12 +53,12 @@ def _fringe(figure: Figure, head: Head, hairline: float) -> list[Part]:
     """Hair over the forehead: one lock to a side, or several teeth."""
     build = figure.build
     centre, half = head.ring(figure, hairline)
-    colour = darker(figure.palette.hair, figure.between(0.88, 1.0))
+    color = darker(figure.palette.hair, figure.between(0.88, 1.0))
     if figure.chance(0.5):
         lean = figure.between(-25.0, 25.0)
         lock = ball((0.0, 0.0, 0.0), (0.86 * half[0], 0.22 * half[1], 0.13 * build.head), sides=8, rings=5)
         lock = lock.moved(rotation((0.0, 1.0, 0.0), lean), centre - np.array((0.0, 0.88 * half[1], 0.0)))
-        return [flat("hair", lock, colour)]
+        return [flat("hair", lock, color)]
     parts = []
     for offset in np.linspace(-0.7, 0.7, int(figure.rng.integers(3, 6))):
         root = centre + np.array(
@@ -70,7 +70,7 @@ def _fringe(figure: Figure, head: Head, hairline: float) -> list[Part]:
             + np.array((figure.between(-0.1, 0.1) * half[0], -0.02, 0.0))
         )
         radii = half[0] * np.array(((0.24, 0.12), (0.04, 0.03)))
-        parts.append(flat("hair", loft(np.stack((root, tip)), radii, sides=6), colour))
+        parts.append(flat("hair", loft(np.stack((root, tip)), radii, sides=6), color))
     return parts
 
 

@@ -31,10 +31,10 @@ def _wizard(figure: Figure, head: Head) -> list[Part]:
     cone = loft(path, radii, axis=UP, sides=10)
     disc = turned(figure, head, level, [(0.9 * brim, -0.06), (brim, -0.03), (1.0, 0.05)])
     band = turned(figure, head, level, [(1.06, 0.04), (1.0, 0.14)])
-    colour = figure.palette.main if figure.chance(0.6) else figure.palette.second
+    color = figure.palette.main if figure.chance(0.6) else figure.palette.second
     return [
-        painted_cloth(figure, "hat", cone, colour),
-        flat("hat", disc, darker(colour, 0.85)),
+        painted_cloth(figure, "hat", cone, color),
+        flat("hat", disc, darker(color, 0.85)),
         flat("hat", band, figure.palette.accent),
     ]
 
@@ -52,10 +52,10 @@ def _brimmed(figure: Figure, head: Head) -> list[Part]:
     droop = figure.between(-0.05, 0.06)
     disc = turned(figure, head, level, [(brim, droop - 0.02), (brim, droop + 0.02), (0.9, 0.05)])
     band = turned(figure, head, level, [(1.05, 0.03), (0.5 + 0.53 * flare + 0.02, 0.13)])
-    colour = figure.palette.leather if figure.chance(0.4) else figure.palette.main
+    color = figure.palette.leather if figure.chance(0.4) else figure.palette.main
     parts = [
-        painted_cloth(figure, "hat", crown, colour),
-        flat("hat", disc, darker(colour, 0.9)),
+        painted_cloth(figure, "hat", crown, color),
+        flat("hat", disc, darker(color, 0.9)),
         flat("hat", band, figure.palette.accent),
     ]
     return parts + (_feather(figure, head) if figure.chance(0.3) else [])
@@ -84,12 +84,12 @@ def _feather(figure: Figure, head: Head) -> list[Part]:
 def _cap(figure: Figure, head: Head) -> list[Part]:
     """A cap with a bill, worn forwards or backwards, or a beanie."""
     level = figure.between(0.66, 0.76)
-    colour = figure.palette.main if figure.chance(0.5) else figure.palette.accent
+    color = figure.palette.main if figure.chance(0.5) else figure.palette.accent
     tall = 1.06 - level
     dome = turned(
         figure, head, level, [(1.0, 0.0), (1.02, 0.4 * tall), (0.85, 0.8 * tall), (0.45, 1.08 * tall)]
     )
-    parts = [painted_cloth(figure, "hat", dome, colour)]
+    parts = [painted_cloth(figure, "hat", dome, color)]
     if figure.chance(0.35):
         parts.append(
             flat("hat", turned(figure, head, level, [(1.08, -0.03), (1.08, 0.09)]), figure.palette.second)
@@ -110,7 +110,7 @@ def _cap(figure: Figure, head: Head) -> list[Part]:
         flat(
             "hat",
             ball(middle, (0.8 * wide, 0.6 * reach * deep + 0.2 * deep, 0.035 * figure.build.head), rings=4),
-            darker(colour, 0.7),
+            darker(color, 0.7),
         )
     )
     return parts
@@ -132,7 +132,7 @@ def _crown(figure: Figure, head: Head) -> list[Part]:
 
 def _hood(figure: Figure, head: Head) -> list[Part]:
     """A hood: around the sides and the back, over the forehead, with a point behind."""
-    thick, colour = (
+    thick, color = (
         figure.between(0.1, 0.2),
         figure.palette.main if figure.chance(0.5) else figure.palette.second,
     )
@@ -142,7 +142,7 @@ def _hood(figure: Figure, head: Head) -> list[Part]:
     shape = head.shell(
         figure, levels, sides, fronts, 1.0 + thick * np.array((1.6, 1.2, 1.3, 1.6, 1.6, 1.5, 2.0))
     )
-    parts = [painted_cloth(figure, "hood", shape, colour)]
+    parts = [painted_cloth(figure, "hood", shape, color)]
     if figure.chance(0.5):
         tail = figure.build.head_centre + np.array((0.0, figure.build.head_depth, 0.35 * figure.build.head))
         path = tail + figure.build.head * np.array(((0.0, -0.2, 0.0), (0.0, 0.15, 0.05), (0.0, 0.4, -0.15)))
@@ -150,7 +150,7 @@ def _hood(figure: Figure, head: Head) -> list[Part]:
             flat(
                 "hood",
                 loft(path, figure.build.head_width * np.array((0.7, 0.4, 0.04)), front=UP, sides=8),
-                colour,
+                color,
             )
         )
     return parts
@@ -160,7 +160,7 @@ def _pirate(figure: Figure, head: Head) -> list[Part]:
     """A bicorne: a wide plate across the crown."""
     level = figure.between(0.7, 0.8)
     centre, wide, deep = brim_seat(figure, head, level)
-    build, colour = figure.build, darker(figure.palette.leather, 0.7)
+    build, color = figure.build, darker(figure.palette.leather, 0.7)
     angle = np.linspace(0.0, np.pi, 9)
     arc = np.stack((1.45 * wide * np.cos(angle), 0.42 * build.head * np.sin(angle) ** 0.8 - 0.02), axis=-1)
     parts = []
@@ -169,10 +169,10 @@ def _pirate(figure: Figure, head: Head) -> list[Part]:
         tilt = np.eye(3)
         tilt[1, 2] = -0.35 * ahead
         parts.append(
-            flat("hat", plate.moved(tilt, centre + np.array((0.0, ahead * 1.0 * deep, 0.02))), colour)
+            flat("hat", plate.moved(tilt, centre + np.array((0.0, ahead * 1.0 * deep, 0.02))), color)
         )
     parts.append(
-        flat("hat", turned(figure, head, level, [(1.03, 0.0), (1.0, 0.18), (0.6, 0.34)]), darker(colour, 0.8))
+        flat("hat", turned(figure, head, level, [(1.03, 0.0), (1.0, 0.18), (0.6, 0.34)]), darker(color, 0.8))
     )
     badge = centre + np.array((0.0, -1.08 * deep + 0.07 * build.head, 0.2 * build.head))
     parts.append(
@@ -189,8 +189,8 @@ def _band(figure: Figure, head: Head) -> list[Part]:
     """A headband, with feathers, knot, goggles or a lamp."""
     level = figure.between(0.66, 0.8)
     centre, wide, deep = brim_seat(figure, head, level)
-    build, colour = figure.build, figure.palette.accent
-    parts = [flat("headband", turned(figure, head, level, [(0.99, 0.0), (1.0, 0.1)]), colour)]
+    build, color = figure.build, figure.palette.accent
+    parts = [flat("headband", turned(figure, head, level, [(0.99, 0.0), (1.0, 0.1)]), color)]
     kind = figure.choose("knot", "goggles", "feathers", "plain")
     if kind == "knot":
         for lean in (-0.3, 0.4):
@@ -208,7 +208,7 @@ def _band(figure: Figure, head: Head) -> list[Part]:
                     loft(
                         path, build.head_width * np.array(((0.08, 0.05), (0.12, 0.04), (0.14, 0.03))), sides=4
                     ),
-                    colour,
+                    color,
                 )
             )
     elif kind == "goggles":

@@ -19,7 +19,7 @@ from charnerf.procedural.shapes import (
 )
 from charnerf.procedural.textures import (
     Canvas,
-    Colour,
+    Color,
     darker,
     mix,
 )
@@ -124,7 +124,7 @@ def head_shape(figure: Figure, head: Head) -> Shape:
     )
 
 
-def make_head(figure: Figure, head: Head, hair: Colour | None, hairline: float) -> list[Part]:
+def make_head(figure: Figure, head: Head, hair: Color | None, hairline: float) -> list[Part]:
     """The head with its painted face; painted hair where the hair is (None: bald)."""
     build = figure.build
     canvas = Canvas(
@@ -155,7 +155,7 @@ def _nose(figure: Figure, head: Head) -> list[Part]:
     centre, half = head.ring(figure, 0.33 if figure.build.name in ("chibi", "blob") else 0.42)
     size = figure.build.head_width * figure.between(0.09, 0.2)
     tip = centre - np.array((0.0, half[1], 0.0))
-    colour = darker(figure.palette.skin, figure.between(0.82, 1.0))
+    color = darker(figure.palette.skin, figure.between(0.82, 1.0))
     if figure.build.name == "blocky" or figure.chance(0.3):
-        return [flat("nose", box(tip, (0.6 * size, 0.7 * size, size), taper=0.6), colour)]
-    return [flat("nose", ball(tip, (0.7 * size, size, size), sides=8, rings=5), colour)]
+        return [flat("nose", box(tip, (0.6 * size, 0.7 * size, size), taper=0.6), color)]
+    return [flat("nose", ball(tip, (0.7 * size, size, size), sides=8, rings=5), color)]

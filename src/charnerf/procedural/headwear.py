@@ -37,9 +37,9 @@ def turned(figure: Figure, head: Head, level: float, profile: list[tuple[float, 
     )
 
 
-def painted_cloth(figure: Figure, name: str, shape: Shape, colour: Array) -> Part:
+def painted_cloth(figure: Figure, name: str, shape: Shape, color: Array) -> Part:
     """A shape of cloth, at times with a pattern."""
-    canvas = Canvas(2.0 * np.pi * figure.build.head_width, figure.build.head, colour)
+    canvas = Canvas(2.0 * np.pi * figure.build.head_width, figure.build.head, color)
     if figure.chance(0.4):
         add_pattern(canvas, figure.rng, figure.palette.second)
     canvas.shade(1.0, figure.shade)

@@ -10,7 +10,7 @@ from charnerf.procedural.palette import BLACK, WHITE
 from charnerf.procedural.textures import (
     NUM_EMBLEMS,
     Canvas,
-    Colour,
+    Color,
     add_emblem,
     add_pattern,
     darker,
@@ -25,8 +25,8 @@ class Outfit:
     trunk: Canvas
     arms: tuple[Canvas, Canvas]
     legs: tuple[Canvas, Canvas]
-    top: Colour
-    hand: Colour
+    top: Color
+    hand: Color
     barefoot: bool
     bare_trunk: bool
 
@@ -38,19 +38,19 @@ def _finish(figure: Figure, canvas: Canvas) -> None:
     canvas.shade(1.0, figure.shade)
 
 
-def _emblem(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _emblem(figure: Figure, canvas: Canvas, top: Color) -> None:
     half = figure.build.waist * figure.between(0.25, 0.6)
     at = (0.5, figure.between(0.6, 0.74))
     add_emblem(canvas, at, half, int(figure.rng.integers(NUM_EMBLEMS)), figure.palette.accent)
 
 
-def _buttons(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _buttons(figure: Figure, canvas: Canvas, top: Color) -> None:
     canvas.strip(0.5, 0.006, darker(top, 0.75))
     for level in np.linspace(0.3, 0.88, int(figure.rng.integers(3, 6))):
         canvas.ellipse(0.5, level, 0.016, 0.016, figure.palette.accent)
 
 
-def _jacket(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _jacket(figure: Figure, canvas: Canvas, top: Color) -> None:
     """An open jacket: wider towards the neck, at times with lapels and a tie."""
     inner = figure.palette.second if figure.chance(0.6) else WHITE
     opening = figure.between(0.03, 0.1) * (0.35 + 0.9 * np.clip(canvas.v - 0.1, 0.0, 1.0))
@@ -63,17 +63,17 @@ def _jacket(figure: Figure, canvas: Canvas, top: Colour) -> None:
         canvas.strip(0.5, 0.012, figure.palette.accent, low=0.3, high=0.95)
 
 
-def _tie(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _tie(figure: Figure, canvas: Canvas, top: Color) -> None:
     canvas.paint(np.abs(canvas.u - 0.5) < 0.09 * np.clip(canvas.v - 0.5, 0.0, 1.0) * 2.0, WHITE)
     canvas.strip(0.5, 0.014, figure.palette.accent, low=0.45, high=0.96)
 
 
-def _zip(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _zip(figure: Figure, canvas: Canvas, top: Color) -> None:
     canvas.strip(0.5, 0.008, figure.palette.metal, low=0.2)
     canvas.band(0.9, 1.0, figure.palette.second)
 
 
-def _sash(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _sash(figure: Figure, canvas: Canvas, top: Color) -> None:
     """A sash from a shoulder to the other hip, around the back too."""
     slope = 1.0 if figure.chance(0.5) else -1.0
     wide = figure.between(0.03, 0.07)
@@ -84,7 +84,7 @@ def _sash(figure: Figure, canvas: Canvas, top: Colour) -> None:
     canvas.paint((np.abs(y + slope * 1.1 * x) < wide) & (ahead > 0.25), figure.palette.accent)
 
 
-def _bib(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _bib(figure: Figure, canvas: Canvas, top: Color) -> None:
     """Dungarees."""
     canvas.paint((np.abs(canvas.u - 0.5) < 0.12) & (canvas.v < 0.72), figure.palette.trousers)
     for u in (0.39, 0.61):
@@ -92,7 +92,7 @@ def _bib(figure: Figure, canvas: Canvas, top: Colour) -> None:
         canvas.ellipse(u, 0.7, 0.02, 0.02, figure.palette.accent)
 
 
-def _pockets(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _pockets(figure: Figure, canvas: Canvas, top: Color) -> None:
     for side in (-1.0, 1.0) if figure.chance(0.6) else (1.0,):
         canvas.rectangle(0.5 + side * 0.09, 0.68, 0.05, 0.04, darker(top, 0.8))
 
@@ -102,7 +102,7 @@ FRONTS = (
 )  # fmt: skip
 
 
-def _back_of_trunk(figure: Figure, canvas: Canvas, top: Colour) -> None:
+def _back_of_trunk(figure: Figure, canvas: Canvas, top: Color) -> None:
     """Something of its own behind: an emblem, straps, a stripe, a yoke."""
     palette = figure.palette
     kind = figure.choose("plain", "plain", "emblem", "stripe", "straps", "yoke", "patch")
@@ -168,7 +168,7 @@ def _metal_trunk(figure: Figure, canvas: Canvas) -> None:
     canvas.paint(vents, BLACK)
 
 
-def _paint_trunk(figure: Figure, top: Colour, bare: bool) -> Canvas:
+def _paint_trunk(figure: Figure, top: Color, bare: bool) -> Canvas:
     palette = figure.palette
     canvas = body.trunk_canvas(figure, palette.skin if bare else top)
     if figure.surface == "robot" and bare:
@@ -196,7 +196,7 @@ def _paint_trunk(figure: Figure, top: Colour, bare: bool) -> Canvas:
     return canvas
 
 
-def _paint_arms(figure: Figure, top: Colour, bare: bool) -> tuple[Canvas, Canvas]:
+def _paint_arms(figure: Figure, top: Color, bare: bool) -> tuple[Canvas, Canvas]:
     palette = figure.palette
     sleeve = 0.0 if bare else float(figure.rng.choice((0.12, 0.3, 0.42, 0.6, 1.01, 1.01, 1.01)))
     cuff = figure.chance(0.4)
@@ -236,14 +236,14 @@ def _paint_legs(figure: Figure, bare: bool, barefoot: bool) -> tuple[Canvas, Can
         length = 0.0 if figure.chance(0.6) else 0.35
     boots = 1.1 if barefoot else float(figure.rng.choice((0.62, 0.75, 0.85, 1.1, 1.1)))
     stripe, knees, torn, pattern, odd = (figure.chance(p) for p in (0.14, 0.14, 0.08, 0.12, 0.06))
-    colours = (palette.trousers, palette.second if odd else palette.trousers)
+    colors = (palette.trousers, palette.second if odd else palette.trousers)
     both = []
-    for left, colour in zip((True, False), colours, strict=True):
+    for left, color in zip((True, False), colors, strict=True):
         canvas = body.limb_canvas(figure, palette.skin, leg=True)
-        canvas.band(0.0, length, colour)
+        canvas.band(0.0, length, color)
         if pattern and length > 0.5:
             painted = canvas.rgb.copy()
-            add_pattern(canvas, figure.rng, darker(colour, 0.7))
+            add_pattern(canvas, figure.rng, darker(color, 0.7))
             canvas.rgb = np.where((canvas.v < length)[..., None], canvas.rgb, painted)
         if stripe:
             canvas.strip(0.75 if left else 0.25, 0.04, palette.accent, high=length)

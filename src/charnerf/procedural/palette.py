@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from charnerf.procedural.textures import Colour, mix
+from charnerf.procedural.textures import Color, mix
 
 SKINS = (
     (0.98, 0.82, 0.70),
@@ -91,32 +91,32 @@ BLACK = np.array((0.06, 0.06, 0.07))
 class Palette:
     """The colours of one character: skin and what it wears."""
 
-    skin: Colour
-    hair: Colour
-    eyes: Colour
-    main: Colour
-    second: Colour
-    accent: Colour
-    trousers: Colour
-    leather: Colour
-    boots: Colour
-    metal: Colour
+    skin: Color
+    hair: Color
+    eyes: Color
+    main: Color
+    second: Color
+    accent: Color
+    trousers: Color
+    leather: Color
+    boots: Color
+    metal: Color
 
 
 def pick(
-    rng: np.random.Generator, colours: tuple[tuple[float, float, float], ...], spread: float = 0.04
-) -> Colour:
+    rng: np.random.Generator, colors: tuple[tuple[float, float, float], ...], spread: float = 0.04
+) -> Color:
     """One of the colours, a little changed."""
-    colour = np.array(colours[int(rng.integers(len(colours)))])
-    return np.clip(colour * rng.uniform(0.9, 1.08) + rng.uniform(-spread, spread, 3), 0.02, 0.98)
+    color = np.array(colors[int(rng.integers(len(colors)))])
+    return np.clip(color * rng.uniform(0.9, 1.08) + rng.uniform(-spread, spread, 3), 0.02, 0.98)
 
 
-def vivid(rng: np.random.Generator, hue: float, saturation: tuple[float, float] = (0.45, 0.95)) -> Colour:
+def vivid(rng: np.random.Generator, hue: float, saturation: tuple[float, float] = (0.45, 0.95)) -> Color:
     """A strong colour of a hue in [0, 1)."""
     return np.array(colorsys.hsv_to_rgb(hue % 1.0, rng.uniform(*saturation), rng.uniform(0.35, 0.95)))
 
 
-def _cloth(rng: np.random.Generator, hue: float) -> Colour:
+def _cloth(rng: np.random.Generator, hue: float) -> Color:
     kind = rng.uniform()
     if kind < 0.3:
         return pick(rng, NEUTRALS)

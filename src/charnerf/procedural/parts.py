@@ -24,9 +24,9 @@ class Part:
     texels: Texels
 
 
-def flat(name: str, shape: Shape, colour: ArrayLike) -> Part:
+def flat(name: str, shape: Shape, color: ArrayLike) -> Part:
     """A part of one sRGB colour."""
-    texel = (np.clip(np.asarray(colour, dtype=np.float64), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    texel = (np.clip(np.asarray(color, dtype=np.float64), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     return Part(name, shape, texel.reshape(1, 1, 3))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
-Colour = NDArray[np.float64]  # sRGB in [0, 1], (3,)
+Color = NDArray[np.float64]  # sRGB in [0, 1], (3,)
 
 TEXELS_PER_M = 110.0
 FINENESS = 2  # painted this many times finer, then averaged: soft edges
@@ -16,52 +16,52 @@ class Canvas:
     Args:
         width_m: Length that u spans (a circumference), m.
         height_m: Length that v spans, m.
-        colour: Base colour.
+        color: Base colour.
         density: Texels per metre.
     """
 
     def __init__(
-        self, width_m: float, height_m: float, colour: Colour, *, density: float = TEXELS_PER_M
+        self, width_m: float, height_m: float, color: Color, *, density: float = TEXELS_PER_M
     ) -> None:
         self.width_m, self.height_m = max(width_m, 1e-3), max(height_m, 1e-3)
         columns = int(np.clip(round(self.width_m * density), 8, 192)) * FINENESS
         rows = int(np.clip(round(self.height_m * density), 8, 160)) * FINENESS
-        self.rgb = np.broadcast_to(np.asarray(colour, dtype=np.float64), (rows, columns, 3)).copy()
+        self.rgb = np.broadcast_to(np.asarray(color, dtype=np.float64), (rows, columns, 3)).copy()
         u, v = (np.arange(columns) + 0.5) / columns, 1.0 - (np.arange(rows) + 0.5) / rows
         self.u, self.v = np.meshgrid(u, v)
 
-    def paint(self, mask: NDArray[np.bool_], colour: ArrayLike, opacity: float = 1.0) -> None:
+    def paint(self, mask: NDArray[np.bool_], color: ArrayLike, opacity: float = 1.0) -> None:
         """Lay a colour over the texels of a mask (rows, columns)."""
-        self.rgb[mask] = (1.0 - opacity) * self.rgb[mask] + opacity * np.asarray(colour)
+        self.rgb[mask] = (1.0 - opacity) * self.rgb[mask] + opacity * np.asarray(color)
 
     def local(self, u: float, v: float) -> tuple[Array, Array]:
         """Offsets in metres (right, up) of every texel from a point; the shorter way around."""
         right = (self.u - u + 0.5) % 1.0 - 0.5
         return right * self.width_m, (self.v - v) * self.height_m
 
-    def band(self, low: float, high: float, colour: Colour) -> None:
+    def band(self, low: float, high: float, color: Color) -> None:
         """A ring around the shape between two v."""
-        self.paint((self.v >= low) & (self.v < high), colour)
+        self.paint((self.v >= low) & (self.v < high), color)
 
     def strip(
-        self, u: float, half_width: float, colour: Colour, *, low: float = 0.0, high: float = 1.0
+        self, u: float, half_width: float, color: Color, *, low: float = 0.0, high: float = 1.0
     ) -> None:
         """An upright strip about u; half width in u."""
         self.paint(
-            (np.abs((self.u - u + 0.5) % 1.0 - 0.5) < half_width) & (self.v >= low) & (self.v < high), colour
+            (np.abs((self.u - u + 0.5) % 1.0 - 0.5) < half_width) & (self.v >= low) & (self.v < high), color
         )
 
-    def ellipse(self, u: float, v: float, right: float, up: float, colour: ArrayLike) -> None:
+    def ellipse(self, u: float, v: float, right: float, up: float, color: ArrayLike) -> None:
         """An ellipse with half sizes in metres."""
         x, y = self.local(u, v)
-        self.paint((x / right) ** 2 + (y / up) ** 2 < 1.0, colour)
+        self.paint((x / right) ** 2 + (y / up) ** 2 < 1.0, color)
 
     def rectangle(
-        self, u: float, v: float, right: float, up: float, colour: Colour, *, tilt: float = 0.0
+        self, u: float, v: float, right: float, up: float, color: Color, *, tilt: float = 0.0
     ) -> None:
         """A rectangle with half sizes in metres; its outer end rises by tilt metres per metre."""
         x, y = self.local(u, v)
-        self.paint((np.abs(x) < right) & (np.abs(y - tilt * x) < up), colour)
+        self.paint((np.abs(x) < right) & (np.abs(y - tilt * x) < up), color)
 
     def shade(self, top: float, bottom: float) -> None:
         """Multiply by a vertical ramp: soft light from above, as painted into many game textures."""
@@ -83,82 +83,82 @@ class Canvas:
         return (np.clip(mean, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
-def mix(first: ArrayLike, second: ArrayLike, share: float) -> Colour:
+def mix(first: ArrayLike, second: ArrayLike, share: float) -> Color:
     """Between two colours."""
     return (1.0 - share) * np.asarray(first, dtype=np.float64) + share * np.asarray(second, dtype=np.float64)
 
 
-def darker(colour: ArrayLike, factor: float = 0.7) -> Colour:
+def darker(color: ArrayLike, factor: float = 0.7) -> Color:
     """A colour times a factor, kept in [0, 1]."""
-    return np.clip(np.asarray(colour, dtype=np.float64) * factor, 0.0, 1.0)
+    return np.clip(np.asarray(color, dtype=np.float64) * factor, 0.0, 1.0)
 
 
-def _stripes(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _stripes(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     width = rng.uniform(0.03, 0.09)
     phase = rng.uniform()
     share = rng.uniform(0.25, 0.55)
-    canvas.paint((canvas.v * canvas.height_m / width + phase) % 1.0 < share, colour)
+    canvas.paint((canvas.v * canvas.height_m / width + phase) % 1.0 < share, color)
 
 
-def _pinstripes(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _pinstripes(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     count = rng.integers(6, 18)
-    canvas.paint((canvas.u * count) % 1.0 < rng.uniform(0.2, 0.5), colour)
+    canvas.paint((canvas.u * count) % 1.0 < rng.uniform(0.2, 0.5), color)
 
 
-def _diagonal(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _diagonal(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     count, slope = rng.integers(3, 8), rng.choice((-1.0, 1.0)) * rng.uniform(2.0, 6.0)
-    canvas.paint((canvas.u * count + canvas.v * slope) % 1.0 < rng.uniform(0.3, 0.5), colour)
+    canvas.paint((canvas.u * count + canvas.v * slope) % 1.0 < rng.uniform(0.3, 0.5), color)
 
 
-def _checks(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _checks(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     cell = rng.uniform(0.04, 0.09)
     columns = max(2, 2 * round(canvas.width_m / cell / 2.0))
     rows = np.floor(canvas.v * canvas.height_m / cell)
-    canvas.paint((np.floor(canvas.u * columns) + rows) % 2 < 1, colour)
+    canvas.paint((np.floor(canvas.u * columns) + rows) % 2 < 1, color)
 
 
-def _plaid(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _plaid(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     cell = rng.uniform(0.06, 0.12)
     columns = max(2, round(canvas.width_m / cell))
-    canvas.paint((canvas.u * columns) % 1.0 < 0.4, colour, 0.5)
-    canvas.paint((canvas.v * canvas.height_m / cell) % 1.0 < 0.4, colour, 0.5)
+    canvas.paint((canvas.u * columns) % 1.0 < 0.4, color, 0.5)
+    canvas.paint((canvas.v * canvas.height_m / cell) % 1.0 < 0.4, color, 0.5)
 
 
-def _dots(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _dots(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     cell = rng.uniform(0.06, 0.12)
     columns = max(2, round(canvas.width_m / cell))
     row = canvas.v * canvas.height_m / cell
     x = (canvas.u * columns + 0.5 * (np.floor(row) % 2)) % 1.0 - 0.5
-    canvas.paint(x**2 + (row % 1.0 - 0.5) ** 2 < rng.uniform(0.06, 0.12), colour)
+    canvas.paint(x**2 + (row % 1.0 - 0.5) ** 2 < rng.uniform(0.06, 0.12), color)
 
 
-def _blotches(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _blotches(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     for _ in range(int(rng.integers(6, 16))):
         right, up = rng.uniform(0.03, 0.09, 2)
-        canvas.ellipse(rng.uniform(), rng.uniform(), right, up, colour)
+        canvas.ellipse(rng.uniform(), rng.uniform(), right, up, color)
 
 
-def _zigzag(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _zigzag(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     count, centre, height = rng.integers(4, 9), rng.uniform(0.3, 0.7), rng.uniform(0.03, 0.07)
     wave = np.abs((canvas.u * count) % 1.0 - 0.5) * 2.0 * height
     offset = (canvas.v - centre) * canvas.height_m - wave
-    canvas.paint(np.abs(offset) < rng.uniform(0.01, 0.03), colour)
+    canvas.paint(np.abs(offset) < rng.uniform(0.01, 0.03), color)
 
 
-def _halves(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
-    canvas.paint(canvas.u < 0.5 if rng.uniform() < 0.5 else canvas.u >= 0.5, colour)
+def _halves(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
+    canvas.paint(canvas.u < 0.5 if rng.uniform() < 0.5 else canvas.u >= 0.5, color)
 
 
-def _fade(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _fade(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     share = np.clip(canvas.v if rng.uniform() < 0.5 else 1.0 - canvas.v, 0.0, 1.0)[..., None]
-    canvas.rgb = (1.0 - 0.8 * share) * canvas.rgb + 0.8 * share * np.asarray(colour)
+    canvas.rgb = (1.0 - 0.8 * share) * canvas.rgb + 0.8 * share * np.asarray(color)
 
 
-def _panels(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def _panels(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     columns, rows = rng.integers(3, 8), rng.integers(2, 5)
     line_u, line_v = 0.008 / canvas.width_m * columns, 0.008 / canvas.height_m * rows
     near = ((canvas.u * columns) % 1.0 < line_u) | ((canvas.v * rows) % 1.0 < line_v)
-    canvas.paint(near, colour)
+    canvas.paint(near, color)
 
 
 PATTERNS = (
@@ -176,9 +176,9 @@ PATTERNS = (
 )
 
 
-def add_pattern(canvas: Canvas, rng: np.random.Generator, colour: Colour) -> None:
+def add_pattern(canvas: Canvas, rng: np.random.Generator, color: Color) -> None:
     """Lay a random pattern over the whole canvas."""
-    PATTERNS[int(rng.integers(len(PATTERNS)))](canvas, rng, colour)
+    PATTERNS[int(rng.integers(len(PATTERNS)))](canvas, rng, color)
 
 
 def emblem_mask(x: Array, y: Array, kind: int) -> NDArray[np.bool_]:
@@ -204,7 +204,7 @@ def emblem_mask(x: Array, y: Array, kind: int) -> NDArray[np.bool_]:
 NUM_EMBLEMS = 12
 
 
-def add_emblem(canvas: Canvas, at: tuple[float, float], half_m: float, kind: int, colour: Colour) -> None:
+def add_emblem(canvas: Canvas, at: tuple[float, float], half_m: float, kind: int, color: Color) -> None:
     """Paint an emblem about a point (u, v)."""
     x, y = canvas.local(*at)
-    canvas.paint(emblem_mask(x / half_m, y / half_m, kind), colour)
+    canvas.paint(emblem_mask(x / half_m, y / half_m, kind), color)

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from charnerf.procedural.palette import BLACK, WHITE, Palette, make_palette
 from charnerf.procedural.parts import Part, flat
 from charnerf.procedural.shapes import box
-from charnerf.procedural.textures import Colour, darker, mix
+from charnerf.procedural.textures import Color, darker, mix
 
 Block = NDArray[np.int64]  # (x, y, z) of colour numbers; 0 is empty
 
@@ -22,17 +22,17 @@ class Voxels:
     def __init__(self, rng: np.random.Generator, palette: Palette) -> None:
         self.rng = rng
         self.palette = palette
-        self._colours: list[Colour] = []
+        self._colors: list[Color] = []
         self._blocks: dict[str, tuple[Block, tuple[int, int, int]]] = {}
 
-    def colour(self, value: ArrayLike) -> int:
+    def color(self, value: ArrayLike) -> int:
         """Number of a colour."""
-        self._colours.append(np.asarray(value, dtype=np.float64))
-        return len(self._colours)
+        self._colors.append(np.asarray(value, dtype=np.float64))
+        return len(self._colors)
 
-    def add(self, name: str, corner: tuple[int, int, int], size: tuple[int, int, int], colour: int) -> Block:
+    def add(self, name: str, corner: tuple[int, int, int], size: tuple[int, int, int], color: int) -> Block:
         """A block full of one colour; paint or carve it in place."""
-        block = np.full(size, colour, dtype=np.int64)
+        block = np.full(size, color, dtype=np.int64)
         key = name
         while key in self._blocks:
             key += "'"
@@ -49,7 +49,7 @@ class Voxels:
             for low, high, number in _boxes(block):
                 start, end = np.array(corner) + low, np.array(corner) + high
                 shape = box(0.5 * (start + end), 0.5 * (end - start))
-                parts.append(flat(key.rstrip("'"), shape, self._colours[number - 1]))
+                parts.append(flat(key.rstrip("'"), shape, self._colors[number - 1]))
         return parts
 
     def _owned(self) -> dict[str, tuple[Block, tuple[int, int, int]]]:
@@ -92,7 +92,7 @@ def _boxes(block: Block) -> list[tuple[NDArray[np.int64], NDArray[np.int64], int
 def _paint_torso(voxels: Voxels, torso: Block, cloth: int) -> None:
     rng, palette = voxels.rng, voxels.palette
     second, accent, leather = (
-        voxels.colour(value) for value in (palette.second, palette.accent, palette.leather)
+        voxels.color(value) for value in (palette.second, palette.accent, palette.leather)
     )
     width, _, height = torso.shape
     kind = int(rng.integers(7))
@@ -115,15 +115,15 @@ def _paint_torso(voxels: Voxels, torso: Block, cloth: int) -> None:
     if rng.uniform() < 0.35:
         torso[width // 2 - 1 : width // 2 + 1, -1, 1 : height - 1] = second
     if rng.uniform() < 0.3:
-        torso[width // 2 - 1 : width - width // 2 + 1, 0, -1] = voxels.colour(palette.skin)
+        torso[width // 2 - 1 : width - width // 2 + 1, 0, -1] = voxels.color(palette.skin)
     torso[torso == 0] = cloth
 
 
 def _paint_face(voxels: Voxels, head: Block) -> None:
     rng, palette = voxels.rng, voxels.palette
     width, _, height = head.shape
-    eye = voxels.colour(BLACK if rng.uniform() < 0.6 else palette.eyes)
-    white, dark = voxels.colour(WHITE), voxels.colour(darker(mix(palette.skin, (0.5, 0.1, 0.1), 0.5), 0.8))
+    eye = voxels.color(BLACK if rng.uniform() < 0.6 else palette.eyes)
+    white, dark = voxels.color(WHITE), voxels.color(darker(mix(palette.skin, (0.5, 0.1, 0.1), 0.5), 0.8))
     level = int(rng.integers(max(1, height // 3), max(2, height // 2 + 1)))
     inset = 1 if width < 7 or rng.uniform() < 0.5 else 2
     tall = 2 if height >= 6 and rng.uniform() < 0.4 else 1
@@ -136,9 +136,9 @@ def _paint_face(voxels: Voxels, head: Block) -> None:
         span = int(rng.integers(0, 2))
         head[width // 2 - 1 - span : width - width // 2 + 1 + span, 0, level - 2] = dark
     if rng.uniform() < 0.2:
-        head[:, 0, : max(1, level - 1)] = voxels.colour(palette.hair)
+        head[:, 0, : max(1, level - 1)] = voxels.color(palette.hair)
     if rng.uniform() < 0.1:
-        head[:, 0, level] = np.where(head[:, 0, level] == eye, eye, voxels.colour(palette.accent))
+        head[:, 0, level] = np.where(head[:, 0, level] == eye, eye, voxels.color(palette.accent))
 
 
 def _add_hair(voxels: Voxels, corner: tuple[int, int, int], size: tuple[int, int, int]) -> None:
@@ -146,8 +146,8 @@ def _add_hair(voxels: Voxels, corner: tuple[int, int, int], size: tuple[int, int
     rng, palette = voxels.rng, voxels.palette
     (x, y, z), (width, depth, height) = corner, size
     hair, main = (
-        voxels.colour(palette.hair),
-        voxels.colour(palette.main if rng.uniform() < 0.5 else palette.accent),
+        voxels.color(palette.hair),
+        voxels.color(palette.main if rng.uniform() < 0.5 else palette.accent),
     )
     kind = int(rng.integers(8))
     if kind in (0, 1, 2):
@@ -173,23 +173,23 @@ def _add_hair(voxels: Voxels, corner: tuple[int, int, int], size: tuple[int, int
         voxels.add("hat", (x - brim, y - brim, z + height), (width + 2 * brim, depth + 2 * brim, 1), main)
         tall = int(rng.integers(1, 5))
         crown = voxels.add("hat", (x + 1, y + 1, z + height + 1), (width - 2, max(depth - 2, 1), tall), main)
-        crown[:, :, 0] = voxels.colour(palette.second)
+        crown[:, :, 0] = voxels.color(palette.second)
     elif kind == 5:
         voxels.add("hat", (x, y, z + height), (width, depth, 1), main)
-        voxels.add("hat", (x, y - 2, z + height - 1), (width, 2, 1), voxels.colour(darker(palette.main, 0.7)))
+        voxels.add("hat", (x, y - 2, z + height - 1), (width, 2, 1), voxels.color(darker(palette.main, 0.7)))
         voxels.add("hair", (x, y + depth, z + 1), (width, 1, height - 1), hair)
     elif kind == 6:
         helmet = voxels.add(
             "helmet",
             (x - 1, y - 1, z + height // 2),
             (width + 2, depth + 2, height - height // 2 + 1),
-            voxels.colour(palette.metal),
+            voxels.color(palette.metal),
         )
         helmet[2:-2, 0, :-2] = 0
         if rng.uniform() < 0.6:
             for column in (x - 2, x + width + 1):
                 voxels.add(
-                    "helmet", (column, y + 1, z + height - 1), (1, 1, 3), voxels.colour((0.9, 0.87, 0.78))
+                    "helmet", (column, y + 1, z + height - 1), (1, 1, 3), voxels.color((0.9, 0.87, 0.78))
                 )
     else:
         tall = int(rng.integers(1, 5))
@@ -198,7 +198,7 @@ def _add_hair(voxels: Voxels, corner: tuple[int, int, int], size: tuple[int, int
                 "ears",
                 (column, y + depth // 2, z + height),
                 (1 + (tall < 3), 1, tall),
-                voxels.colour(palette.skin),
+                voxels.color(palette.skin),
             )
 
 
@@ -212,17 +212,17 @@ def _add_extras(voxels: Voxels, width: int, depth: int, low: int, high: int) -> 
             "backpack",
             (x + 1, depth, low + 1),
             (width - 2, 2, max(high - low - 1, 1)),
-            voxels.colour(palette.leather),
+            voxels.color(palette.leather),
         )
     elif kind == 1:
-        cape = voxels.add("cape", (x, depth, 1), (width, 1, high - 1), voxels.colour(palette.accent))
-        cape[:, :, 0] = voxels.colour(palette.second)
+        cape = voxels.add("cape", (x, depth, 1), (width, 1, high - 1), voxels.color(palette.accent))
+        cape[:, :, 0] = voxels.color(palette.second)
     elif kind == 2:
-        voxels.add("tail", (x + width // 2, depth, low), (1, 2, 1), voxels.colour(palette.skin))
-        voxels.add("tail", (x + width // 2, depth + 2, low), (1, 1, 3), voxels.colour(palette.skin))
+        voxels.add("tail", (x + width // 2, depth, low), (1, 2, 1), voxels.color(palette.skin))
+        voxels.add("tail", (x + width // 2, depth + 2, low), (1, 1, 3), voxels.color(palette.skin))
     elif kind == 3:
         for side in (x - 2, x + width):
-            voxels.add("pauldrons", (side, 0, high - 1), (2, depth, 1), voxels.colour(palette.metal))
+            voxels.add("pauldrons", (side, 0, high - 1), (2, depth, 1), voxels.color(palette.metal))
 
 
 def make_voxel_parts(rng: np.random.Generator) -> list[Part]:
@@ -236,7 +236,7 @@ def make_voxel_parts(rng: np.random.Generator) -> list[Part]:
     torso_height = int(rng.integers(3, 6)) * fine
     leg_width = min(max(leg_width, width // 4), width // 2)
     skin, cloth, trousers, boots = (
-        voxels.colour(value) for value in (palette.skin, palette.main, palette.trousers, palette.boots)
+        voxels.color(value) for value in (palette.skin, palette.main, palette.trousers, palette.boots)
     )
     half = width // 2
     inset = int(rng.integers(0, max(1, half - leg_width + 1)))
