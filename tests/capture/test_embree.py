@@ -8,8 +8,6 @@ from charnerf.capture.embree import CaptureOptions, capture_character
 from charnerf.capture.lights import Headlight
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import angles_from_direction, project
-from charnerf.surfaces.raycast import RayCaster
-from charnerf.surfaces.scene_mesh import surface_of_scene
 
 SMALL = {"views": 3, "size": 48}
 
@@ -178,23 +176,6 @@ def test_headlight_darkens_slants_only():
     assert lit[24, 24, 0] >= 254
     rim = (plain[..., 3] > 0) & (plain[..., 3] < 255)
     assert lit[rim][:, 0].max() < 235
-
-
-def test_rays_meet_a_ball_where_the_formula_says():
-    rng = np.random.default_rng(0)
-    caster = RayCaster.of_surface(surface_of_scene(ball(subdivisions=6)))
-    origins = np.tile(np.array((0.0, -4.0, 1.0), np.float32), (2000, 1))
-    directions = np.stack(
-        (rng.uniform(-0.3, 0.3, 2000), np.ones(2000), rng.uniform(-0.3, 0.3, 2000)), axis=-1
-    )
-    directions = (directions / np.linalg.norm(directions, axis=-1, keepdims=True)).astype(np.float32)
-    hits = caster.first_hits(origins, directions)
-    along = directions[:, 1] * 4.0
-    inside = along**2 - 15.0
-    assert ((hits.triangles >= 0) == (inside > 0))[np.abs(inside) > 0.02].all()
-    sure = inside > 0.02
-    np.testing.assert_allclose(hits.distances[sure], along[sure] - np.sqrt(inside[sure]), atol=3e-3)
-    assert np.isinf(hits.distances[hits.triangles < 0]).all()
 
 
 @pytest.mark.parametrize(

@@ -2,25 +2,14 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from PIL import Image
 from scipy import stats
 
 from charnerf.data.surface import AreaSurface, VisibleSurface, visible_surface_points
 from charnerf.errors import DataError
-from charnerf.surfaces.mesh_files import load_surface_mesh, write_surface_mesh
-from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, surface_of_scene
-from charnerf.surfaces.surface_mesh import SurfaceMaterial, SurfaceMesh, interpolate, shade, triangle_areas
-
-
-def plain_mesh(triangles, factor=(1.0, 1.0, 1.0, 1.0), cutoff=None):
-    triangles = np.asarray(triangles, np.float32)
-    return SurfaceMesh(
-        triangles=triangles,
-        uvs=np.zeros((len(triangles), 3, 2), np.float32),
-        colors=np.ones((len(triangles), 3, 4), np.float32),
-        material_ids=np.zeros(len(triangles), np.int32),
-        materials=(SurfaceMaterial(np.array(factor, np.float32), cutoff=cutoff),),
-    )
+from charnerf.surfaces.mesh_files import write_surface_mesh
+from charnerf.surfaces.scene_mesh import surface_of_scene
+from charnerf.surfaces.surface_mesh import interpolate, triangle_areas
+from support.surfaces import plain_mesh, textured_quad
 
 
 def generator(seed=0):
@@ -132,66 +121,6 @@ def test_visible_points_face_outwards_and_are_even(tmp_path):
     assert stats.kstest(upper[:, 2], "uniform").pvalue > 1e-4
 
 
-def textured_quad(pixels, **material):
-    quad = trimesh.Trimesh(
-        vertices=[[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], faces=[[0, 1, 2], [0, 2, 3]], process=False
-    )
-    pbr = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(pixels), **material)
-    quad.visual = trimesh.visual.TextureVisuals(uv=[[0, 0], [1, 0], [1, 1], [0, 1]], material=pbr)
-    return quad
-
-
-def test_texture_rows_run_down_and_factors_multiply_light():
-    pixels = np.zeros((2, 2, 3), np.uint8)
-    pixels[0] = (200, 0, 0)  # the upper row
-    quad = textured_quad(pixels)
-    quad.metadata[FACTOR_KEY] = (0.5, 1.0, 1.0, 1.0)
-    mesh = surface_of_scene(quad)
-    upper = shade(mesh, np.array([1]), np.array([0.25]), np.array([0.5]))[0]  # at (0.25, 0.75)
-    light = ((200 / 255 + 0.055) / 1.055) ** 2.4
-    np.testing.assert_allclose(upper, (0.5 * light, 0.0, 0.0, 1.0), atol=1e-6)
-    lower = shade(mesh, np.array([0]), np.array([0.5]), np.array([0.25]))[0]  # at (0.75, 0.25)
-    np.testing.assert_allclose(lower, (0.0, 0.0, 0.0, 1.0), atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    "encoding, light", [("srgb", ((128 / 255 + 0.055) / 1.055) ** 2.4), (None, 128 / 255)]
-)
-def test_vertex_and_face_colours_mean_what_their_file_means(encoding, light):
-    for kind in ("vertex_colors", "face_colors"):
-        mesh = trimesh.creation.box()
-        if encoding:
-            mesh.metadata[COLORS_KEY] = encoding
-        setattr(mesh.visual, kind, (128, 128, 128, 0))
-        surface = surface_of_scene(mesh)
-        np.testing.assert_allclose(surface.colors[..., :3], light, atol=1e-6)
-        assert (surface.colors[..., 3] == 1.0).all()
-
-
-def test_files_keep_shape_and_look(tmp_path):
-    rng = np.random.default_rng(0)
-    quad = textured_quad(rng.integers(0, 256, (8, 8, 4), dtype=np.uint8), alphaMode="MASK", alphaCutoff=0.25)
-    quad.metadata[FACTOR_KEY] = (0.3, 0.6, 0.9, 0.8)
-    box = trimesh.creation.box()
-    box.visual.vertex_colors = rng.integers(0, 256, (8, 4), dtype=np.uint8)
-    box.apply_translation((3.0, 0.0, 0.0))
-    before = surface_of_scene(trimesh.Scene([quad, box]))
-    (tmp_path / "mesh").mkdir()
-    write_surface_mesh(tmp_path / "mesh/mesh.obj", before)
-    after = load_surface_mesh(tmp_path / "mesh/mesh.obj")
-    np.testing.assert_allclose(after.triangles, before.triangles, atol=1e-6)
-    np.testing.assert_allclose(after.uvs, before.uvs, atol=1e-6)
-    assert sorted(path.suffix for path in (tmp_path / "mesh").iterdir()) == [".mtl", ".obj", ".png"]
-    triangles = rng.integers(0, len(before.triangles), 500)
-    u = rng.uniform(0.0, 0.5, 500)
-    v = rng.uniform(0.0, 0.5, 500)
-    first, second = shade(before, triangles, u, v), shade(after, triangles, u, v)
-    there = first[:, 3] > 0
-    assert (there == (second[:, 3] > 0)).mean() > 0.98  # 8-bit alpha
-    np.testing.assert_allclose(first[there, :3], second[there, :3], atol=6e-3)
-    assert 0.0 < (~there).mean() < 0.9
-
-
 def test_cut_outs_carry_no_points():
     pixels = np.full((2, 16, 4), 255, np.uint8)
     pixels[:, 8:, 3] = 0  # the right half is not there
@@ -205,23 +134,3 @@ def test_cut_outs_carry_no_points():
 
 def test_areas_are_geometry():
     assert triangle_areas(two_parts()).sum() == pytest.approx(4.0)
-
-
-@pytest.mark.parametrize(
-    "content, message",
-    [
-        (None, "no such file"),
-        (
-            "# charnerf mesh 1: metres, +Z up, facing -Y; v x y z r g b with sRGB colours\n",
-            "no such file, named",
-        ),
-        ("v 0 0 0\n", "mesh"),
-        ("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
-    ],
-)
-def test_wrong_mesh_files_are_named(tmp_path, content, message):
-    if content is not None:
-        (tmp_path / "mesh.obj").write_text(content)
-    with pytest.raises(DataError, match=message) as caught:
-        load_surface_mesh(tmp_path / "mesh.obj")
-    assert str(tmp_path) in str(caught.value)

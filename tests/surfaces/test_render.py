@@ -3,12 +3,9 @@
 import numpy as np
 import torch
 import trimesh
-from PIL import Image
 
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
-from charnerf.meshing.sheet import around, contact_sheet
 from charnerf.surfaces.render import render_clay, render_mesh
-from charnerf.types import SourceViews
 
 
 def _box() -> trimesh.Trimesh:
@@ -43,14 +40,3 @@ def test_clay_is_grey_and_brightest_straight_on():
     (picture,) = render_clay(mesh, _cameras(0.0))
     assert np.ptp(picture[16, 16, :3]) < 1e-6
     assert picture[16, 16, 0] > picture[16, 22, 0] > picture[16, 23, 0]
-
-
-def test_the_sheet_frames_the_mesh_from_eight_sides():
-    flags = torch.zeros(1, 3, dtype=torch.bool)
-    views = SourceViews(torch.ones(1, 3, 4, 32, 32), _cameras(0.0, 90.0, 180.0)[None], ~flags, flags)
-    mesh = _box()
-    assert isinstance(contact_sheet(mesh, views), Image.Image)
-    alphas = render_mesh(mesh, around(mesh, 48))[..., 3]
-    assert len(alphas) == 8
-    assert not alphas[:, [0, -1]].any() and not alphas[:, :, [0, -1]].any()
-    assert alphas.mean() > 0.1
