@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -32,7 +33,7 @@ from charnerf.bench.subjects import NUM_PIXELS, subject
 from charnerf.bench.sweep import Method, sample_methods, sweep
 from charnerf.bench.workbench import ADAPTIVE, CULLED, DENSE, Workbench, settings_of
 from charnerf.geometry.resizing import resized_views
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_renderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
@@ -94,10 +95,12 @@ def _resolutions(setting: Setting) -> list[dict[str, Any]]:
     rows = []
     for side in SOURCE_SIDES:
         pictured = replace(setting.pictured[0], views=resized_views(setting.pictured[0].views, side))
-        one = subject(pictured, bench.network)
+        network = copy(bench.network)  # that takes drawings of this side as they are
+        network.image_size = side
+        one = subject(pictured, network)
         start = time.perf_counter()
         with torch.no_grad():
-            bench.network.encode(one.views)
+            network.encode(one.views)
         encoding = time.perf_counter() - start
         adaptive = {ADAPTIVE: bench.renderers[ADAPTIVE]}
         measured = measure(one, adaptive, repeats=2, baseline=False, reference=original.converged)[ADAPTIVE]
@@ -128,7 +131,7 @@ def _arithmetic(setting: Setting) -> list[dict[str, Any]]:
 def _losses(setting: Setting) -> list[dict[str, Any]]:
     """Losses of training one character from seeded weights: culled, dense and as the baseline."""
     network, cfg = network_of(("scale=small",))
-    like = {**settings_of(runs.build_renderer(cfg)), "num_coarse": int(cfg.scale.train_num_coarse)}
+    like = {**settings_of(build_renderer(cfg)), "num_coarse": int(cfg.scale.train_num_coarse)}
     pictured = setting.pictured[0]
     one = subject(pictured, network, num_pixels=pictured.camera.width * pictured.camera.height)
     curves = loss_curves(

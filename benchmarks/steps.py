@@ -8,7 +8,7 @@ from benchmarks.untrained import network_of
 from charnerf.bench.subjects import Pictured, subject
 from charnerf.bench.training_step import batch_of, step_timings
 from charnerf.bench.workbench import CULLED, DENSE, settings_of
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_renderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
@@ -17,7 +17,7 @@ def step_at_scale(pictured: Pictured, scale: str, *, repeats: int) -> dict[str, 
     """A training step at a scale, seeded weights, the rays of its first phase: packed, dense, and as the baseline."""
     network, cfg = network_of((f"scale={scale}",))
     num_rays = int(cfg.scale.phase_rays[0])
-    renderer = runs.build_renderer(cfg)
+    renderer = build_renderer(cfg)
     like = {**settings_of(renderer), "num_coarse": int(cfg.scale.train_num_coarse)}
     one = subject(pictured, network, num_pixels=num_rays)
     renderers = {CULLED: CulledRenderer(**like), DENSE: DenseRenderer(**like)}

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from charnerf.config.composition import compose_config
-from charnerf.inference import weights
+from charnerf.inference.build import build_model
 from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 
@@ -33,14 +33,14 @@ def untrained_like(network: CharNeRF, seed: int = 0) -> CharNeRF:
 def network_of(overrides: Sequence[str]) -> tuple[CharNeRF, Any]:
     """A network of a composed config with seeded weights, and the config."""
     cfg = compose_config(list(overrides))
-    return untrained_like(weights.build_model(cfg)).requires_grad_(False).eval(), cfg
+    return untrained_like(build_model(cfg)).requires_grad_(False).eval(), cfg
 
 
 def resized_network(model: Model, width: int, seed: int = 0) -> CharNeRF:
     """A network as the model's with another width and seeded weights, on the same device."""
     config = copy.deepcopy(model.config)
     config.model.width = width
-    network = untrained_like(weights.build_model(config), seed)
+    network = untrained_like(build_model(config), seed)
     return network.requires_grad_(False).eval().to(model.device)
 
 

@@ -12,7 +12,8 @@ import trimesh
 from charnerf.cli import run
 from charnerf.config.composition import compose_config, run_door
 from charnerf.errors import ConfigError, DataError
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_model
+from charnerf.inference.weights import save_weights
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = ("capture", "generate", "evaluate", "mesh", "reconstruct", "report")
@@ -21,7 +22,7 @@ COMMANDS = ("capture", "generate", "evaluate", "mesh", "reconstruct", "report")
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cfg = compose_config(["scale=smoke"])
-    return runs.save_weights(tmp_path_factory.mktemp("run") / "x.safetensors", runs.build_model(cfg), cfg)
+    return save_weights(tmp_path_factory.mktemp("run") / "x.safetensors", build_model(cfg), cfg)
 
 
 @pytest.fixture(scope="module")

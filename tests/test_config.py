@@ -10,7 +10,7 @@ from omegaconf import DictConfig, OmegaConf
 from charnerf.config import validate, validate_model
 from charnerf.config.composition import check_command_line, compose_config
 from charnerf.errors import ConfigError
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_model, build_part, build_renderer
 
 ROOT = Path(__file__).resolve().parents[1]
 OPTIONS = sorted(file.relative_to(ROOT / "conf") for file in (ROOT / "conf").glob("*/*.yaml"))
@@ -52,9 +52,9 @@ def test_every_option_composes_and_validates(option: Path) -> None:
 )
 def test_every_model_option_builds(option: Path) -> None:
     cfg = compose_config(["scale=smoke", *overrides_for(option)])
-    model = runs.build_model(cfg)
+    model = build_model(cfg)
     assert sum(p.numel() for p in model.parameters()) > 0
-    assert type(runs.build_renderer(cfg)).__module__.startswith("charnerf.volume.renderers")
+    assert type(build_renderer(cfg)).__module__.startswith("charnerf.volume.renderers")
 
 
 @pytest.mark.parametrize("group", ["loss", "schedule", "data"])
@@ -62,16 +62,16 @@ def test_other_options_build(group: str) -> None:
     for option in OPTIONS:
         if option.parent.name == group:
             cfg = compose_config(overrides_for(option))
-            assert type(runs.build_part(cfg[group])).__module__.startswith("charnerf.")
+            assert type(build_part(cfg[group])).__module__.startswith("charnerf.")
 
 
 def test_a_fine_field_is_its_own() -> None:
     cfg = compose_config(["scale=smoke", "renderer.num_fine=4"])
-    model = runs.build_model(cfg)
+    model = build_model(cfg)
     assert model.fine is not None
     coarse = {id(parameter) for parameter in model.coarse.parameters()}
     assert coarse.isdisjoint(id(parameter) for parameter in model.fine.parameters())
-    assert runs.build_model(compose_config(["scale=smoke", "renderer.num_fine=0"])).fine is None
+    assert build_model(compose_config(["scale=smoke", "renderer.num_fine=0"])).fine is None
 
 
 # What is wrong, and the message.

@@ -7,7 +7,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from charnerf.config.composition import compose_config
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_part
 from charnerf.training.run import reads
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -85,7 +85,7 @@ def test_pixelnerf_is_pixelnerf_at_the_papers_scale() -> None:
 def test_only_the_row_with_depth_reads_it() -> None:
     for row in EXPERIMENT_ROWS:
         cfg = compose_config([f"experiment={row}"])
-        assert reads(cfg, runs.build_part(cfg.loss), "depth") == (row == "no_mha_depth")
+        assert reads(cfg, build_part(cfg.loss), "depth") == (row == "no_mha_depth")
         both = compose_config([f"experiment={row}", "loss=opacity"])  # the table once more, with another loss
         assert both.loss.weights.opacity == 0.1
 

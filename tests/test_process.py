@@ -11,7 +11,8 @@ import torch
 
 from charnerf import process
 from charnerf.config.composition import compose_config
-from charnerf.inference.weights import build_model, save_weights
+from charnerf.inference.build import build_model
+from charnerf.inference.weights import save_weights
 from charnerf.process import use_fastest_products
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from charnerf.errors import (
         ShapeError as ShapeError,
     )
-    from charnerf.inference.model import Hero as Hero
+    from charnerf.inference.hero import Hero as Hero
     from charnerf.inference.model import Model as Model
     from charnerf.inference.weights import load as load
     from charnerf.inference.weights import save_weights as save_weights
@@ -48,7 +48,7 @@ _HOMES = {
     "save_weights": "charnerf.inference.weights",
     "save_mesh": "charnerf.meshing.export",
     "Model": "charnerf.inference.model",
-    "Hero": "charnerf.inference.model",
+    "Hero": "charnerf.inference.hero",
     "CharNeRFError": "charnerf.errors",
     "ConfigError": "charnerf.errors",
     "DataError": "charnerf.errors",

@@ -24,8 +24,10 @@ from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.files import write_text
 from charnerf.geometry.resizing import resized_cameras
-from charnerf.inference import weights as runs
-from charnerf.inference.model import Model, TextureKind
+from charnerf.inference.build import build_renderer
+from charnerf.inference.hero import TextureKind
+from charnerf.inference.model import Model
+from charnerf.inference.weights import load
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.lod import lod_table
 from charnerf.process import use_fastest_products
@@ -46,14 +48,14 @@ def say(text: str) -> None:
 def load_model(path: Path | None, *, device: str, trust: Sequence[str], renderer: str | None = None) -> Model:
     """Load a model onto a device, with its own renderer or another one of the same settings."""
     use_fastest_products()
-    model = runs.load(path, trusted_targets=trust).to(pick_device(device))
+    model = load(path, trusted_targets=trust).to(pick_device(device))
     if model.note is not None:
         say(f"{model.source}: {model.note}")
     if renderer is None:
         return model
     changed = OmegaConf.masked_copy(model.config, ["quadrature"])
     changed.renderer = option("renderer", renderer, like=model.config.renderer)
-    return replace(model, renderer=runs.build_renderer(changed))
+    return replace(model, renderer=build_renderer(changed))
 
 
 def pick_device(name: str) -> torch.device:
@@ -155,7 +157,7 @@ def evaluate(
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
     metrics = evaluate_split(
-        model.any_size,  # type: ignore[arg-type]
+        model.network,
         model.renderer,
         data,
         split,

@@ -12,8 +12,9 @@ from charnerf.cli import run
 from charnerf.config.composition import compose_config
 from charnerf.finetuning import Recipe, finetune
 from charnerf.finetuning.report import write_finetuned
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_model
 from charnerf.inference.model import Model
+from charnerf.inference.weights import save_weights
 
 QUICK = Recipe(
     seconds=60.0,
@@ -32,7 +33,7 @@ def model(tmp_path_factory) -> Model:
     torch.manual_seed(0)
     cfg = compose_config(["scale=smoke"])
     file = tmp_path_factory.mktemp("smoke") / "weights.safetensors"
-    return charnerf.load(runs.save_weights(file, runs.build_model(cfg), cfg))
+    return charnerf.load(save_weights(file, build_model(cfg), cfg))
 
 
 def test_the_folder_loads_as_the_adapted_model(model, person_views, tmp_path):

@@ -14,7 +14,8 @@ from safetensors.torch import load_file, save_file
 import charnerf
 from charnerf.config.composition import compose_config
 from charnerf.errors import ConfigError, DataError
-from charnerf.inference import weights as runs
+from charnerf.inference.build import build_model
+from charnerf.inference.weights import MODEL_SECTIONS, save_config, save_weights
 from charnerf.models.charnerf import CharNeRF
 
 
@@ -25,12 +26,12 @@ def cfg() -> DictConfig:
 
 @pytest.fixture(scope="module")
 def network(cfg: DictConfig) -> CharNeRF:
-    return runs.build_model(cfg)
+    return build_model(cfg)
 
 
 @pytest.fixture
 def weights(tmp_path: Path, network: CharNeRF, cfg: DictConfig) -> Path:
-    return runs.save_weights(tmp_path / "weights.safetensors", network, cfg)
+    return save_weights(tmp_path / "weights.safetensors", network, cfg)
 
 
 def rewritten(weights: Path, change: dict) -> Path:
@@ -47,7 +48,7 @@ def rewritten(weights: Path, change: dict) -> Path:
 def write_run(folder: Path, network: CharNeRF, cfg: DictConfig) -> Path:
     """A run folder with a checkpoint alone."""
     (folder / "checkpoints").mkdir(parents=True)
-    runs.save_config(folder, cfg)
+    save_config(folder, cfg)
     state = {f"model.{name}": value for name, value in network.state_dict().items()}
     torch.save({"state_dict": state}, folder / "checkpoints" / "last.ckpt")
     return folder
@@ -65,7 +66,7 @@ def test_weights_come_back_bit_by_bit(weights: Path, network: CharNeRF) -> None:
 def test_weights_hold_the_model_and_nothing_of_the_machine(weights: Path) -> None:
     with safe_open(str(weights), framework="pt") as opened:
         config = json.loads(opened.metadata()["config"])
-    assert set(config) == set(runs.MODEL_SECTIONS)
+    assert set(config) == set(MODEL_SECTIONS)
     assert "${" not in json.dumps(config)
     assert list(weights.parent.iterdir()) == [weights]
 
@@ -78,7 +79,7 @@ def test_a_run_folder_and_its_checkpoint_load(tmp_path: Path, network: CharNeRF,
         assert torch.equal(
             model.network.state_dict()["encoder." + first(model.network)], first_value(network)
         )
-    runs.save_weights(folder / "weights.safetensors", network, cfg)
+    save_weights(folder / "weights.safetensors", network, cfg)
     assert charnerf.load(folder).source == folder / "weights.safetensors"
 
 
@@ -189,6 +190,6 @@ def test_a_hero_is_rendered_and_meshed(weights: Path) -> None:
 def test_released_weights_that_are_not_there_are_named(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(runs, "RELEASED", tmp_path / "released.safetensors")
+    monkeypatch.setattr("charnerf.inference.weights.RELEASED", tmp_path / "released.safetensors")
     with pytest.raises(DataError, match="holds no released weights"):
         charnerf.load()

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from charnerf.geometry.cameras import cameras_towards
-from charnerf.inference.model import Hero
+from charnerf.inference.hero import Hero
 from charnerf.meshing.convergence import (
     convergence_lines,
     direction_spread,

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from charnerf.errors import ShapeError
-from charnerf.inference.model import AnySize, fitted
+from charnerf.geometry.resizing import resized_views
 from charnerf.meshing.symmetry import symmetric_scene
 from charnerf.types import SourceViews
 from support import helpers, tiny_models
@@ -86,18 +86,16 @@ def test_other_views_are_no_detail_of_these(model):
         model.encode(striped(SMALL), detailed=striped(LARGE)[:, :2])
 
 
-def test_views_of_any_size_are_encoded_as_the_model_was_trained(model):
-    any_size = AnySize(model, SMALL)
+def test_views_of_any_size_are_encoded_as_the_model_was_trained_and_coloured_as_given(model):
     large = striped(LARGE)
-    small, detailed = fitted(large, SMALL)
-    assert small.cameras.width == SMALL and detailed is large
-    assert fitted(small, SMALL) == (small, None)
-    assert fitted(small, LARGE)[0].cameras.width == LARGE and fitted(small, LARGE)[1] is None
+    small = model.fitted(large)
+    assert small.cameras.width == SMALL and model.fitted(small) is small
     points = points_of_stripes()
     dirs = torch.tensor((0.0, 1.0, 0.0)).expand_as(points)
     with torch.no_grad():
-        found = any_size.scene(any_size.encode(large), 0).field(points, dirs)
+        found = model.scene(model.encode(large), 0).field(points, dirs)
         expected = model.scene(model.encode(small, detailed=large), 0).at_width(LARGE).field(points, dirs)
-        unchanged = any_size.scene(any_size.encode(small), 0).field(points, dirs)
-        plain = model.scene(model.encode(small), 0).field(points, dirs)
-    assert torch.equal(found.rgb, expected.rgb) and torch.equal(unchanged.rgb, plain.rgb)
+        enlarged = model.encode(resized_views(small, LARGE // 8))
+    assert torch.equal(found.rgb, expected.rgb)
+    assert torch.equal(model.carve(large).occupancy, model.carve(small).occupancy)
+    assert enlarged.views.cameras.width == SMALL and enlarged.detailed is None

@@ -15,7 +15,7 @@ from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.hull import build_hull
-from charnerf.inference.model import Hero
+from charnerf.inference.hero import Hero
 from charnerf.meshing.parts import read_texture
 from charnerf.reconstruction import reconstruct
 from charnerf.types import FieldOutput, Scene

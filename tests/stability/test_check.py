@@ -9,7 +9,7 @@ import torch
 
 from charnerf.config.composition import compose_config
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
-from charnerf.inference.weights import build_model, build_renderer
+from charnerf.inference.build import build_model, build_renderer
 from charnerf.stability import CheckReport, TrainedField, light, naive, run_check
 from charnerf.stability.measure import Target
 from charnerf.stability.report import CheckRow

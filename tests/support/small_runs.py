@@ -10,7 +10,7 @@ from omegaconf import DictConfig
 
 from charnerf.config.composition import compose_config
 from charnerf.data.datamodule import MixedDataModule
-from charnerf.inference.weights import build_model, build_part, build_renderer
+from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
 from charnerf.training.run import build_data, build_trainer, surface_delta, training_renderer

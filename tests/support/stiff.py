@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from charnerf.config.composition import compose_config
 from charnerf.errors import CharNeRFError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.inference.weights import build_model, build_part
+from charnerf.inference.build import build_model, build_part
 from charnerf.losses.total import PassOutput, WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.stability.transforms import Motion

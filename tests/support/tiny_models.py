@@ -107,6 +107,7 @@ def tiny_model(
     single_view: str = "world",
     fine: bool = False,
     hull: bool = True,
+    image_size: int = 32,
     width: int = WIDTH,
     num_blocks: int = 1,
 ) -> CharNeRF:
@@ -143,6 +144,7 @@ def tiny_model(
         box_centre=[0.0, 0.0, 1.0],
         box_half_extent=1.8,
         hull=hull,
+        image_size=image_size,
     )
 
 

@@ -9,7 +9,8 @@ import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from charnerf.errors import ConfigError, DataError
-from charnerf.inference.weights import build_model, load, load_config
+from charnerf.inference.build import build_model
+from charnerf.inference.weights import load, load_config
 from charnerf.losses.total import TERMS
 from charnerf.training.clock import RunClock
 from charnerf.training.module import rate_at

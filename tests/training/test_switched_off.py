@@ -9,7 +9,7 @@ from torch import nn
 
 from charnerf.config.composition import compose_config
 from charnerf.errors import DataError
-from charnerf.inference.weights import build_model
+from charnerf.inference.build import build_model
 from charnerf.models.encoders.hourglass import Hourglass
 from charnerf.models.mlp import ResidualBlock
 from support import helpers, small_runs

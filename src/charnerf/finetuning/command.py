@@ -11,7 +11,8 @@ from charnerf.errors import DataError
 from charnerf.finetuning.finetune import CurvePoint, Finetuned, finetune
 from charnerf.finetuning.recipe import Recipe
 from charnerf.finetuning.report import summary_lines, write_finetuned
-from charnerf.inference.model import Hero, Model
+from charnerf.inference.hero import Hero
+from charnerf.inference.model import Model
 
 BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
 

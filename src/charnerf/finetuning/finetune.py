@@ -23,7 +23,8 @@ from charnerf.errors import DataError
 from charnerf.finetuning.known import finest, render_known
 from charnerf.finetuning.material import Material, Targets, gather, render_all
 from charnerf.finetuning.recipe import Recipe
-from charnerf.inference.model import Hero, Model
+from charnerf.inference.hero import Hero
+from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import LeftOut
 

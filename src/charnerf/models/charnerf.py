@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from charnerf.errors import ShapeError
 from charnerf.geometry.hull import build_hull
 from charnerf.geometry.occupied import coarse_occupancy
+from charnerf.geometry.resizing import resized_views
 from charnerf.models.encoders.base import AbstractEncoder
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
 from charnerf.models.field import Field
@@ -33,12 +34,14 @@ class EncodedViews(TensorRecord):
         views: The source views used, (B, V), mirrored ones included.
         feature_maps: W^i = E(I_i), (B, V, F, h, w).
         hull: Their hulls, or None for a model without.
+        width: Of the drawings as they were given, pixels: scenes are coloured at it.
         detailed: The views used on white with more pixels, (B, V, 3, H', W'), or None where there are none.
     """
 
     views: SourceViews
     feature_maps: Tensor
     hull: Hull | None
+    width: int
     detailed: Tensor | None = None
 
 
@@ -56,6 +59,7 @@ class CharNeRF(nn.Module):
         box_half_extent: Half of its side, m; coordinates are scaled by it before eq. 1, so that they stay
             in (-1, 1).
         hull: Whether the visual hull belongs to the model.
+        image_size: Width that drawings are encoded at, pixels.
 
     Source: paper, Overview.
     """
@@ -73,6 +77,7 @@ class CharNeRF(nn.Module):
         box_centre: list[float],
         box_half_extent: float,
         hull: bool,
+        image_size: int,
     ) -> None:
         super().__init__()
         self.encoder = encoder
@@ -83,6 +88,7 @@ class CharNeRF(nn.Module):
         self.box_half_extent = float(box_half_extent)
         self.register_buffer("box_centre", torch.tensor(box_centre, dtype=torch.float32), persistent=False)
         self.has_hull = hull
+        self.image_size = image_size
 
     @property
     def device(self) -> torch.device:
@@ -94,10 +100,15 @@ class CharNeRF(nn.Module):
         """Lower and upper corner of the space looked at, (3,) each, m."""
         return self.box_centre - self.box_half_extent, self.box_centre + self.box_half_extent
 
+    def fitted(self, views: SourceViews) -> SourceViews:
+        """Drawings of any size as they are encoded: at the width that the encoder was trained on."""
+        return views if views.cameras.width == self.image_size else resized_views(views, self.image_size)
+
     def carve(self, views: SourceViews) -> Hull | None:
         """Hulls of drawings (B, V), for callers who keep them; None for a model without a hull."""
         if not self.has_hull:
             return None
+        views = self.fitted(views)
         box_min, box_max = (corner.to(views.images) for corner in self.box)  # data carves on its own device
         return build_hull(self.views(views), box_min=box_min, box_max=box_max)
 
@@ -107,9 +118,11 @@ class CharNeRF(nn.Module):
         """Encode characters once.
 
         Args:
-            views: Drawings, (B, V), V from 1 to 8; padded views are marked absent.
+            views: Drawings of any size, (B, V), V from 1 to 8; padded views are marked absent. They are encoded at the width
+                that the encoder was trained on, and scenes coloured at their own.
             hull: Their hulls from `carve`, carved here if not given.
-            detailed: The same drawings with more pixels: `Scene.at_width` then reads colours from them.
+            detailed: The same drawings with more pixels: `Scene.at_width` then reads colours from them; `views` themselves
+                where those are wider than the encoder's.
 
         Returns:
             What `scene` needs.
@@ -117,6 +130,9 @@ class CharNeRF(nn.Module):
         Raises:
             ShapeError: If the pictures' sides do not suit the encoder, or the detailed ones are other views.
         """
+        given, views = views, self.fitted(views)
+        if detailed is None and given.cameras.width > self.image_size:
+            detailed = given
         height, width = views.images.shape[-2:]
         multiple = self.encoder.multiple
         if height % multiple or width % multiple:
@@ -134,6 +150,7 @@ class CharNeRF(nn.Module):
             views=used,
             feature_maps=maps.unflatten(0, used.present.shape),
             hull=hull,
+            width=given.cameras.width,
             detailed=None if detailed is None else self._detail_of(used, detailed),
         )
 
@@ -195,7 +212,7 @@ class CharNeRF(nn.Module):
         def at_width(width: int) -> Scene:
             return scene_of(Pictures.of(detailed, width) if width > encoded_width else None, None)
 
-        return scene_of(None, at_width)
+        return scene_of(None, at_width) if encoded.width <= encoded_width else at_width(encoded.width)
 
     def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
         """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""

@@ -16,7 +16,8 @@ from charnerf.errors import DataError
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.report import plot_curve, summary_lines
 from charnerf.geometry.framing import HEIGHT
-from charnerf.inference.model import TEXTURE_SIZE, Model, TextureKind
+from charnerf.inference.hero import TEXTURE_SIZE, TextureKind
+from charnerf.inference.model import Model
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet

@@ -7,7 +7,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from charnerf.errors import DataError
-from charnerf.inference.model import Hero, Model
+from charnerf.inference.hero import Hero
+from charnerf.inference.model import Model
 from charnerf.pictures import bytes_on_white
 from charnerf.reconstruction.turntable import ELEVATION_DEG
 

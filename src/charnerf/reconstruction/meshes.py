@@ -8,7 +8,7 @@ from tqdm import tqdm
 
 from charnerf.files import write_text
 from charnerf.geometry.framing import HEIGHT
-from charnerf.inference.model import TEXTURE_SIZE, Hero, TextureKind
+from charnerf.inference.hero import TEXTURE_SIZE, Hero, TextureKind
 from charnerf.meshing.convergence import convergence_lines, measure_convergence
 from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh
 from charnerf.meshing.lod import Lod, lod_report, named

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from charnerf.errors import DataError
-from charnerf.inference.model import Hero
+from charnerf.inference.hero import Hero
 
 ELEVATION_DEG = 10.0
 SECONDS_A_TURN = 3.0

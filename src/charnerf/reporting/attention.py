@@ -14,7 +14,7 @@ from charnerf.evaluation.attention import (
     view_attention_of,
     write_profile,
 )
-from charnerf.inference import weights as runs
+from charnerf.inference.weights import load
 from charnerf.reporting.blocks import Block, Heading, Picture, Plot, Text
 from charnerf.reporting.interactive import Line, lines_figure
 from charnerf.reporting.plots import plot_lines
@@ -46,7 +46,7 @@ def make_profile(run: Run, *, trusted: Sequence[str] = ()) -> AttentionProfile:
     file, weights = run.folder / ATTENTION_FILE, run.folder / "weights.safetensors"
     if file.is_file() and (not weights.is_file() or file.stat().st_mtime >= weights.stat().st_mtime):
         return read_profile(file)
-    model = runs.load(run.folder, trusted_targets=trusted)
+    model = load(run.folder, trusted_targets=trusted)
     view_attention_of(model.network)
     root = data_root(run)
     characters = [

@@ -18,8 +18,8 @@ from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array, load_drawing
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.geometry.framing import SOURCE_ORDER, source_cameras
-from charnerf.inference import weights as runs
 from charnerf.inference.model import Model
+from charnerf.inference.weights import load
 from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.pictures import CELL, picture_on_white, save_matrix
 from charnerf.reporting.rows import Row
@@ -143,7 +143,7 @@ def drawn_matrix(
     models: dict[str, Model] = {}
     for row in rows:
         try:
-            models[row.label] = runs.load(row.runs[0].folder, trusted_targets=trusted)
+            models[row.label] = load(row.runs[0].folder, trusted_targets=trusted)
         except CharNeRFError as error:
             blocks.append(Text(f"{row.label} can not be loaded: {error}"))
     if not models:

@@ -15,7 +15,7 @@ from charnerf.evaluation.ray_weights import (
     read_ray_weights,
     write_ray_weights,
 )
-from charnerf.inference import weights as runs
+from charnerf.inference.weights import load
 from charnerf.reporting.blocks import Block, Bullets, Heading, Picture, Plot, Table, Text
 from charnerf.reporting.interactive import Line, lines_figure
 from charnerf.reporting.parts import NONE
@@ -37,7 +37,7 @@ def measure(run: Run, *, trusted: Sequence[str] = ()) -> RayWeights:
     file, weights = run.folder / RAY_WEIGHTS_FILE, run.folder / "weights.safetensors"
     if file.is_file() and (not weights.is_file() or file.stat().st_mtime >= weights.stat().st_mtime):
         return read_ray_weights(file)
-    model = runs.load(run.folder, trusted_targets=trusted)
+    model = load(run.folder, trusted_targets=trusted)
     root = data_root(run)
     names = names_of(read_dataset(root), run.metrics["split"])[:CHARACTERS]
     found = ray_weights(model.network, model.renderer, [load_character(root, name) for name in names])

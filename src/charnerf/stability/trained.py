@@ -144,7 +144,13 @@ def _reversed(encoded: EncodedViews) -> EncodedViews:
             edge_distances=hull.edge_distances[:, order],
             dilations=hull.dilations[:, order],
         )
-    return EncodedViews(views=encoded.views[:, order], feature_maps=encoded.feature_maps[:, order], hull=hull)
+    return replace(
+        encoded,
+        views=encoded.views[:, order],
+        feature_maps=encoded.feature_maps[:, order],
+        hull=hull,
+        detailed=None if encoded.detailed is None else encoded.detailed[:, order],
+    )
 
 
 def _in_float64(trained: TrainedField, encoded: EncodedViews) -> Tensor:

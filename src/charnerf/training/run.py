@@ -21,7 +21,8 @@ from charnerf.data.sampler import PhaseSampler
 from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
 from charnerf.data.surface import AbstractSurface
 from charnerf.errors import ConfigError
-from charnerf.inference.weights import build_model, build_part, build_renderer, save_config, save_weights
+from charnerf.inference.build import build_model, build_part, build_renderer
+from charnerf.inference.weights import save_config, save_weights
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.surfaces.mesh_files import load_surface_mesh
