@@ -11,8 +11,8 @@ from typing import Literal
 import torch
 from omegaconf import OmegaConf
 
+from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_dataset
-from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.lights import Headlight, Unlit
 from charnerf.config.options import option
 from charnerf.data.characters import load_character
@@ -369,15 +369,12 @@ def _checked_character(model: Model, data: Path | None, character: str | None) -
             raise DataError(f"{data}: found no characters, expected at least one.")
         known = load_character(data, character or names[0])
         return known.sources, _small(known.cameras[0])
-    from charnerf.capture.embree import capture_character
+    from charnerf.capture.character import capture_character
     from charnerf.procedural import make_character
 
     options = CaptureOptions(views=3, size=model.image_size, light=Unlit())
     pictures = capture_character(make_character(CHECKED_SEED), options).pictures
-    drawings = torch.from_numpy(pictures.source_images).permute(0, 3, 1, 2)[None].float() / 255.0
-    flags = torch.ones(drawings.shape[:2], dtype=torch.bool)
-    views = SourceViews(drawings, pictures.source_cameras[None].to(torch.float32), flags, ~flags)
-    return views, _small(pictures.cameras[1].to(torch.float32))
+    return pictures.source_views, _small(pictures.cameras[1].to(torch.float32))
 
 
 def _small(camera: Cameras) -> Cameras:

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_dataset, capture_scene_to
-from charnerf.capture.embree import CaptureOptions
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import ConfigError, DataError

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_dataset
-from charnerf.capture.embree import CaptureOptions
-from charnerf.capture.part_swaps import Figure, slab, swap_parts
+from charnerf.capture.part_swaps import CutSurface, slab, swap_parts
 from charnerf.data.layout import read_dataset
 from charnerf.errors import DataError
 from charnerf.surfaces.scene_mesh import surface_of_scene
@@ -38,7 +38,7 @@ def figure(color, *, neck=1.55, hips=0.8, wide=1.8, fine=1):
 
 @pytest.mark.parametrize(("neck", "hips"), [(1.5, 0.8), (1.7, 0.5), (1.2, 0.4)])
 def test_neck_and_hips_are_found_in_the_outline(neck, hips):
-    found = Figure(figure((9, 9, 9), neck=neck, hips=hips))
+    found = CutSurface(figure((9, 9, 9), neck=neck, hips=hips))
     assert found.neck == pytest.approx(neck, abs=0.13)
     assert found.hips == pytest.approx(hips, abs=0.06)
 

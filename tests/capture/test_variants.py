@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_dataset
-from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.variants import variant
 from charnerf.data.layout import read_dataset
 from charnerf.surfaces.mesh_files import load_surface_mesh

@@ -13,7 +13,7 @@ import trimesh
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelAligned
-from charnerf.capture.embree import CaptureOptions, capture_character
+from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.procedural_data import character_seed
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
@@ -104,11 +104,10 @@ def embedded(count: int, size: int) -> list[Pictured]:
 def captured(name: str, scene: trimesh.Scene, size: int) -> Pictured:
     """Capture a character in the world frame."""
     pictures = capture_character(scene, CaptureOptions(views=TARGET_VIEWS, size=size)).pictures
-    drawings = torch.from_numpy(pictures.source_images).permute(0, 3, 1, 2)[None].float() / 255.0
-    present = torch.ones(drawings.shape[:2], dtype=torch.bool)
-    views = SourceViews(drawings, pictures.source_cameras[None].to(torch.float32), present, ~present)
     picture = torch.from_numpy(pictures.images[-1]).float() / 255.0
-    return Pictured(name, views, pictures.cameras[TARGET_VIEWS - 1].to(torch.float32), picture)
+    return Pictured(
+        name, pictures.source_views, pictures.cameras[TARGET_VIEWS - 1].to(torch.float32), picture
+    )
 
 
 def of_dataset(root: Path, split: str, count: int | None) -> list[Pictured]:

@@ -1,7 +1,7 @@
 """Meshes to characters of a data set, in parallel processes; each is written aside and renamed."""
 
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 from tqdm import tqdm
 
-from charnerf.capture.embree import CaptureOptions, capture_character
+from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
 from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
@@ -60,10 +60,10 @@ def capture_dataset(
         options: How they are captured.
         up: Axis that points up in all files; None for each format's own.
         facing: Signed axis that the characters face; None for each format's own.
-        variants: Capture this many variants of each mesh instead of it (capture/variants.py), named NAME+1, NAME+2, ...
-        swaps: Capture this many characters with each mesh's body and the head and legs of other meshes given instead of it
-            (capture/part_swaps.py), named NAME+s1, NAME+s2, ...
-        seed: What variants and parts are drawn from; the same seed gives the same ones, however many.
+        variants: Of each mesh, captured instead of it (capture/variants.py): NAME+1, NAME+2, ...
+        swaps: Characters with each mesh's body and other meshes' heads and legs, instead of it (capture/part_swaps.py):
+            NAME+s1, NAME+s2, ...
+        seed: What variants and swaps are drawn from; the same seed gives the same ones, however many.
         processes: Worker processes; None for one a core.
 
     Returns:
@@ -74,41 +74,19 @@ def capture_dataset(
         ConfigError: Before any work, if up and facing are no axes.
     """
     options = options or CaptureOptions()
-    files = expand_mesh_paths(mesh_paths)
-    root = Path(root)
+    files, root = expand_mesh_paths(mesh_paths), Path(root)
     check_name("split", split)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
-    items = []
-    for file in files:
-        items += [_Item(file, number) for number in range(1, variants + 1)]
-        items += [_Item(file, number, swapped=True) for number in range(1, swaps + 1)]
-    items = items or [_Item(file) for file in files]
+    items = _items(files, variants, swaps)
     refuse_taken_names(open_or_new(root), [item.name for item in items])
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
     work = partial(
         _capture_item, root=root, options=options, donors=sorted(files), up=up, facing=facing, seed=seed
     )
-    messages: dict[_Item, str | None] = {}
-    facts = made_by(options)
-    try:
-        with tqdm(total=len(items), desc="capture", unit="character", dynamic_ncols=True) as bar:
-            for item, message in in_processes(work, items, processes):
-                if message is None:
-                    add_to_split(root, split, [item.name], made_by=facts)
-                else:
-                    bar.write(f"not captured: {message}")
-                messages[item] = message
-                bar.update()
-    finally:  # interrupted: what was written meanwhile belongs to the data set too
-        unlisted = [item.name for item in items if item not in messages and (root / item.name).is_dir()]
-        if unlisted:
-            add_to_split(root, split, unlisted, made_by=facts)
-    return CaptureReport(
-        captured=tuple(item.name for item in items if messages[item] is None),
-        failed=tuple(message for item in items if (message := messages[item]) is not None),
-    )
+    add = partial(add_to_split, root, split, made_by=made_by(options))
+    return _capture_items(items, work, add, root=root, processes=processes)
 
 
 def capture_scene_to(
@@ -182,6 +160,44 @@ class _Item:
     def name(self) -> str:
         kind = "s" if self.swapped else ""
         return f"{self.file.stem}{SEPARATOR}{kind}{self.number}" if self.number else self.file.stem
+
+
+def _items(files: Sequence[Path], variants: int, swaps: int) -> list[_Item]:
+    """What is captured: the files, or so many variants and exchanges of each."""
+    items = []
+    for file in files:
+        items += [_Item(file, number) for number in range(1, variants + 1)]
+        items += [_Item(file, number, swapped=True) for number in range(1, swaps + 1)]
+    return items or [_Item(file) for file in files]
+
+
+def _capture_items(
+    items: Sequence[_Item],
+    work: Callable[[_Item], str | None],
+    add: Callable[[list[str]], object],
+    *,
+    root: Path,
+    processes: int | None,
+) -> CaptureReport:
+    """Capture in parallel; `work` gives what is wrong with an item, `add` puts the others into the data set."""
+    messages: dict[_Item, str | None] = {}
+    try:
+        with tqdm(total=len(items), desc="capture", unit="character", dynamic_ncols=True) as bar:
+            for item, message in in_processes(work, items, processes):
+                if message is None:
+                    add([item.name])
+                else:
+                    bar.write(f"not captured: {message}")
+                messages[item] = message
+                bar.update()
+    finally:  # interrupted: what was written meanwhile belongs to the data set too
+        unlisted = [item.name for item in items if item not in messages and (root / item.name).is_dir()]
+        if unlisted:
+            add(unlisted)
+    return CaptureReport(
+        captured=tuple(item.name for item in items if messages[item] is None),
+        failed=tuple(message for item in items if (message := messages[item]) is not None),
+    )
 
 
 def _capture_item(

@@ -33,7 +33,7 @@ def load_scene(path: str | Path, up: str | None = None, facing: str | None = Non
             own.
 
     Returns:
-        A scene whose graph carries the change of frame; colours as data/scene_mesh.py reads them.
+        A scene whose graph carries the change of frame; colours as surfaces/scene_mesh.py reads them.
 
     Raises:
         DataError: If the file is missing, of another format, unreadable, without faces, or has vertices that

@@ -37,7 +37,7 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
     Raises:
         DataError: If one of the parts has no surface.
     """
-    body, head, legs = (Figure(bent(one, rng)) for one in characters)
+    body, head, legs = (CutSurface(bent(one, rng)) for one in characters)
     parts = {
         "body": slab(body.surface, body.hips, body.neck),
         "head": _fitted(
@@ -63,7 +63,7 @@ def _standing(surface: SurfaceMesh) -> SurfaceMesh:
     return replace(surface, triangles=triangles.astype(np.float32))
 
 
-class Figure:
+class CutSurface:
     """A surface and where its outline from the front would be cut.
 
     Attributes:

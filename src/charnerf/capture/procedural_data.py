@@ -3,8 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, final
@@ -12,8 +11,8 @@ from typing import Any, final
 import numpy as np
 from tqdm import tqdm
 
+from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_scene_to, made_by
-from charnerf.capture.embree import CaptureOptions
 from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import remove_partial_characters
 from charnerf.data.layout import (
@@ -25,9 +24,11 @@ from charnerf.data.layout import (
     write_dataset,
 )
 from charnerf.errors import ConfigError, DataError
+from charnerf.files import locked
 from charnerf.procedural import GENERATOR_VERSION, make_character
 
 SPLITS = ("train", "val", "test")
+_LOCK_FILE = ".generate.lock"
 
 
 def character_seed(seed: int, split: str, index: int) -> int:
@@ -84,22 +85,10 @@ def generate_dataset(
         "seed": seed,
     }
     root.mkdir(parents=True, exist_ok=True)
-    with _locked(root):
-        wanted = _wanted(counts)
+    with locked(root / _LOCK_FILE):  # one process generates, others wait
+        wanted = [(split, index) for split, count in counts.items() for index in range(count)]
         _begin(root, wanted, facts)
-        missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
-        work = partial(_make, root=root, seed=seed, options=options)
-        with tqdm(
-            total=len(wanted),
-            initial=len(wanted) - len(missing),
-            desc="embedded characters",
-            unit="character",
-            dynamic_ncols=True,
-            disable=not missing,
-        ) as bar:
-            for (split, index), _ in in_processes(work, missing, processes):
-                add_to_split(root, split, [_name(split, index)])
-                bar.update()
+        _make_missing(root, wanted, partial(_make, root=root, seed=seed, options=options), processes)
     return read_dataset(root)
 
 
@@ -187,10 +176,6 @@ def _name(split: str, index: int) -> str:
     return f"{split}-{index:05d}"
 
 
-def _wanted(counts: dict[str, int]) -> list[tuple[str, int]]:
-    return [(split, index) for split, count in counts.items() for index in range(count)]
-
-
 def _begin(root: Path, wanted: Sequence[tuple[str, int]], facts: dict[str, Any]) -> None:
     """Make or check dataset.json, and list characters that an interrupted run wrote but did not list."""
     info = open_or_new(root)
@@ -211,22 +196,27 @@ def _begin(root: Path, wanted: Sequence[tuple[str, int]], facts: dict[str, Any])
     write_dataset(DatasetInfo(root=root, splits=splits, made_by={**info.made_by, **facts}))
 
 
+def _make_missing(
+    root: Path,
+    wanted: Sequence[tuple[str, int]],
+    make: Callable[[tuple[str, int]], None],
+    processes: int | None,
+) -> None:
+    """Make the characters whose folders are not there, in parallel, and add them to their splits."""
+    missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
+    with tqdm(
+        total=len(wanted),
+        initial=len(wanted) - len(missing),
+        desc="embedded characters",
+        unit="character",
+        dynamic_ncols=True,
+        disable=not missing,
+    ) as bar:
+        for (split, index), _ in in_processes(make, missing, processes):
+            add_to_split(root, split, [_name(split, index)])
+            bar.update()
+
+
 def _make(pair: tuple[str, int], *, root: Path, seed: int, options: CaptureOptions) -> None:
     """Generate and capture one character."""
     capture_scene_to(root, _name(*pair), make_character(character_seed(seed, *pair)), options)
-
-
-@contextmanager
-def _locked(root: Path) -> Iterator[None]:
-    """One process generates, others wait; the system frees the lock of a killed one."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: two commands at once on one folder are not guarded
-        yield
-        return
-    handle = os.open(root / ".generate.lock", os.O_RDWR | os.O_CREAT)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)

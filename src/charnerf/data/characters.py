@@ -89,6 +89,11 @@ class CharacterPictures:
     source_names: tuple[str, ...]
     depths: np.ndarray | None = None
 
+    @property
+    def source_views(self) -> SourceViews:
+        """The source views as models read them, B = 1."""
+        return _source_views(torch.from_numpy(self.source_images), self.source_cameras.to(torch.float32))
+
 
 def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Character:
     """Open a character of a data set.
@@ -120,7 +125,6 @@ def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Char
     cameras = files.source_cameras[order]
     size = (cameras.width, cameras.height)
     images = torch.stack([read_rgba(files.source_files[index], size) for index in order])
-    flags = torch.zeros(1, len(order), dtype=torch.bool)
     mesh_file = folder / MESH_FILE
     return Character(
         name=name,
@@ -128,12 +132,7 @@ def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Char
         cameras=files.cameras,
         image_files=files.image_files,
         depth_files=files.depth_files,
-        sources=SourceViews(
-            images=(images.float() / 255.0).permute(0, 3, 1, 2)[None].contiguous(),
-            cameras=cameras[None],
-            present=~flags,
-            mirrored=flags,
-        ),
+        sources=_source_views(images, cameras),
         source_names=tuple(files.source_names[index] for index in order),
         mesh_file=mesh_file if mesh_file.is_file() else None,
     )
@@ -247,6 +246,17 @@ def _write_pictures(folder: Path, pictures: CharacterPictures) -> None:
             Image.fromarray(depth).save(folder / name)
     text = transforms_text(pictures.cameras, image_names, depth_names, pictures.source_cameras, source_files)
     (folder / TRANSFORMS_FILE).write_text(text, encoding="utf-8")
+
+
+def _source_views(images: Tensor, cameras: Cameras) -> SourceViews:
+    """Pictures uint8 (V, H, W, 4) and their cameras (V,) as B = 1."""
+    flags = torch.zeros(1, len(images), dtype=torch.bool)
+    return SourceViews(
+        images=(images.float() / 255.0).permute(0, 3, 1, 2)[None].contiguous(),
+        cameras=cameras[None],
+        present=~flags,
+        mirrored=flags,
+    )
 
 
 def _rank(name: str) -> tuple[int, str]:

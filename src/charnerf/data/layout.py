@@ -8,16 +8,14 @@ Names of folders that begin with a dot are characters being written; nothing rea
 """
 
 import json
-import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from charnerf.errors import DataError
-from charnerf.files import write_text
+from charnerf.files import locked, write_text
 
 FORMAT = "charnerf-dataset"
 VERSION = 1
@@ -207,7 +205,7 @@ def add_to_split(
     root = Path(root)
     root.mkdir(parents=True, exist_ok=True)
     check_name("split", split)
-    with _locked(root):
+    with locked(root):  # against other processes that add to it
         path = root / DATASET_FILE
         info = read_dataset(root) if path.exists() else DatasetInfo(root=root, splits={}, made_by={})
         listed = {name for members in info.splits.values() for name in members}
@@ -218,19 +216,3 @@ def add_to_split(
         info = DatasetInfo(root=root, splits=splits, made_by={**info.made_by, **(made_by or {})})
         write_dataset(info)
     return info
-
-
-@contextmanager
-def _locked(root: Path) -> Iterator[None]:
-    """Hold the data set against other processes that add to it; the system frees the lock of a killed one."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: two commands at once on one data set are not guarded
-        yield
-        return
-    handle = os.open(root, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from charnerf.data.layout import TRANSFORMS_FILE
 from charnerf.data.transforms import read_transforms
-from charnerf.geometry.cameras import direction_from_angles, fibonacci_hemisphere
-from charnerf.geometry.framing import SOURCE_AZIMUTHS, framing_cameras
+from charnerf.geometry.cameras import fibonacci_hemisphere
+from charnerf.geometry.framing import framing_cameras, source_cameras
 from charnerf.surfaces.raycast import RayCaster
 from charnerf.surfaces.surface_mesh import SurfaceMesh, triangle_normals
 from charnerf.types import Cameras
@@ -62,10 +61,9 @@ def capture_cameras(mesh_file: Path) -> Cameras | None:
 
 def default_cameras(mesh: SurfaceMesh) -> Cameras:
     """Cameras (51,) as a capture sets them: a Fibonacci hemisphere and the three source views."""
-    azimuths = torch.tensor(tuple(SOURCE_AZIMUTHS.values()), dtype=torch.float64)
-    level = direction_from_angles(azimuths, torch.zeros_like(azimuths))
-    directions = torch.cat((fibonacci_hemisphere(48), level))
-    return framing_cameras(directions, radius=mesh.framing_radius, size=128)
+    radius, size = mesh.framing_radius, 128
+    targets = framing_cameras(fibonacci_hemisphere(48), radius=radius, size=size)
+    return Cameras.joined([targets, source_cameras(radius=radius, size=size, orthographic=False)])
 
 
 def _rays_to(camera: Cameras, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

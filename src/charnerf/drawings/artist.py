@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from charnerf.capture.embree import capture_sources
+from charnerf.capture.character import capture_sources
 from charnerf.data.characters import Character
 from charnerf.data.drawing_style import draw_pictures, random_style
 from charnerf.geometry.framing import SOURCE_ORDER

@@ -4,7 +4,7 @@ import torch
 import trimesh
 from PIL import Image
 
-from charnerf.capture.embree import CaptureOptions, capture_character
+from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.lights import Headlight
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import angles_from_direction, project

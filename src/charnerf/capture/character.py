@@ -1,0 +1,99 @@
+"""One character captured: pictures of its surface from all around, and its source views."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import trimesh
+
+from charnerf.capture.lights import AbstractLight, Unlit
+from charnerf.capture.studio import EDGE_SUBSAMPLES, SUBSAMPLES, Studio
+from charnerf.data.characters import CharacterPictures
+from charnerf.errors import ConfigError
+from charnerf.geometry.cameras import fibonacci_hemisphere
+from charnerf.geometry.framing import SOURCE_ORDER, framing_cameras, source_cameras
+from charnerf.surfaces.scene_mesh import surface_of_scene
+from charnerf.surfaces.surface_mesh import SurfaceMesh
+
+
+@dataclass(frozen=True)
+class CaptureOptions:
+    """How a character is captured.
+
+    Attributes:
+        views: Target pictures, on a Fibonacci lattice of the upper hemisphere.
+        size: Side of every picture, pixels.
+        sources: Projection of the source views.
+        depth: Whether to keep depth pictures.
+        light: How the surface is lit.
+        subsamples: Rays a pixel.
+        edge_subsamples: Rays for each pixel that the silhouette crosses.
+    """
+
+    views: int = 48
+    size: int = 128
+    sources: Literal["orthographic", "pinhole"] = "orthographic"
+    depth: bool = False
+    light: AbstractLight = field(default_factory=Unlit)
+    subsamples: int = SUBSAMPLES
+    edge_subsamples: int = EDGE_SUBSAMPLES
+
+    def __post_init__(self) -> None:
+        """Check the options.
+
+        Raises:
+            ConfigError: If one is out of its range.
+        """
+        for name, least in (("views", 1), ("size", 8), ("subsamples", 1), ("edge_subsamples", 1)):
+            if getattr(self, name) < least:
+                raise ConfigError(f"{name}: found {getattr(self, name)}, expected at least {least}.")
+        if self.sources not in ("orthographic", "pinhole"):
+            raise ConfigError(f"sources: found {self.sources!r}, expected 'orthographic' or 'pinhole'.")
+
+
+@dataclass(frozen=True)
+class CapturedCharacter:
+    """Pictures and cameras of a character, and the surface that they were taken of."""
+
+    pictures: CharacterPictures
+    surface: SurfaceMesh
+
+
+def capture_character(
+    scene: trimesh.Scene | trimesh.Trimesh | SurfaceMesh, options: CaptureOptions
+) -> CapturedCharacter:
+    """Take all pictures of a scene that stands in the world frame.
+
+    Args:
+        scene: World frame, from `meshes.load_scene` or a generator; or its surface.
+        options: How.
+
+    Returns:
+        Pictures with their cameras: pinhole targets, and the source views front, side, back.
+
+    Raises:
+        DataError: If the scene has no triangles.
+    """
+    surface = scene if isinstance(scene, SurfaceMesh) else surface_of_scene(scene)
+    radius, size = surface.framing_radius, options.size
+    targets = framing_cameras(fibonacci_hemisphere(options.views), radius=radius, size=size)
+    sources = source_cameras(radius=radius, size=size, orthographic=options.sources == "orthographic")
+    studio = Studio(
+        surface, options.light, subsamples=options.subsamples, edge_subsamples=options.edge_subsamples
+    )
+    shots, source_shots = studio.shoot(targets), studio.shoot(sources)
+    pictures = CharacterPictures(
+        cameras=targets,
+        images=np.stack([shot.rgba for shot in shots]),
+        source_cameras=sources,
+        source_images=np.stack([shot.rgba for shot in source_shots]),
+        source_names=SOURCE_ORDER,
+        depths=np.stack([shot.depth for shot in shots]) if options.depth else None,
+    )
+    return CapturedCharacter(pictures=pictures, surface=surface)
+
+
+def capture_sources(surface: SurfaceMesh, size: int) -> np.ndarray:
+    """Orthographic source views of a surface, front, side and back, RGBA uint8 (3, size, size, 4)."""
+    shots = Studio(surface, Unlit()).shoot(source_cameras(radius=surface.framing_radius, size=size))
+    return np.stack([shot.rgba for shot in shots])
