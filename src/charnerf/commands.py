@@ -33,7 +33,7 @@ from charnerf.meshing.lod import lod_table
 from charnerf.process import use_fastest_products
 from charnerf.reconstruction.folder import reconstruct as write_reconstruction
 from charnerf.reconstruction.meshes import MeshRequest, write_meshes
-from charnerf.reporting.report import report as write_report
+from charnerf.reporting.folder_report import report as write_report
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
 

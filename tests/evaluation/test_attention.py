@@ -6,12 +6,12 @@ import torch
 from charnerf.data.characters import load_character
 from charnerf.errors import ConfigError
 from charnerf.evaluation.attention import (
+    AttentionProfile,
     attention_profile,
     mean_parts,
-    read_profile,
     view_attention_of,
-    write_profile,
 )
+from charnerf.evaluation.records import read_record, write_record
 from charnerf.geometry.safe import safe_normalize
 from charnerf.models.combinators.view_attention import ViewAttention
 from charnerf.volume.quadrature.constant import PiecewiseConstant
@@ -95,8 +95,10 @@ def test_the_view_part_follows_the_papers_curve(profile):
 
 
 def test_a_profile_is_read_as_it_was_written(profile, tmp_path):
-    write_profile(tmp_path / "attention.json", profile[1])
-    assert read_profile(tmp_path / "attention.json") == profile[1]
+    write_record(tmp_path / "attention.json", profile[1])
+    assert (
+        read_record(tmp_path / "attention.json", AttentionProfile, what="an attention profile") == profile[1]
+    )
 
 
 def test_other_combinators_have_no_view_part():

@@ -8,11 +8,11 @@ import torch
 from charnerf.data.characters import load_character
 from charnerf.errors import DataError
 from charnerf.evaluation.ray_weights import (
+    RayWeights,
     normalised_entropy,
     ray_weights,
-    read_ray_weights,
-    write_ray_weights,
 )
+from charnerf.evaluation.records import read_record, write_record
 from charnerf.types import FieldOutput, Scene
 from charnerf.volume.quadrature.constant import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -31,7 +31,9 @@ def ball_model(density, *, radius=0.6):
     scene = Scene(
         coarse=field, fine=None, hull=None, box_min=BOX[0], box_max=BOX[1], density_sees_directions=False
     )
-    return SimpleNamespace(box=BOX, encode=lambda views: views, scene=lambda encoded, index: scene)
+    return SimpleNamespace(
+        device=torch.device("cpu"), encode=lambda views: views, scene=lambda encoded, index: scene
+    )
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +92,8 @@ def test_without_a_mesh_or_an_opaque_ray_it_says_so(ball):
 
 def test_figures_are_read_as_they_were_written(ball, tmp_path):
     found = measured(ball, 50.0)
-    write_ray_weights(tmp_path / "ray_weights.json", found)
-    assert read_ray_weights(tmp_path / "ray_weights.json") == found
+    write_record(tmp_path / "ray_weights.json", found)
+    assert read_record(tmp_path / "ray_weights.json", RayWeights, what="figures of ray weights") == found
     (tmp_path / "ray_weights.json").write_text(json.dumps({"entropy": 1}))
     with pytest.raises(DataError, match="expected figures of ray weights"):
-        read_ray_weights(tmp_path / "ray_weights.json")
+        read_record(tmp_path / "ray_weights.json", RayWeights, what="figures of ray weights")

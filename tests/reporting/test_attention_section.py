@@ -5,8 +5,9 @@ import shutil
 import pytest
 import yaml
 
-from charnerf.evaluation.attention import AttentionProfile, write_profile
-from charnerf.reporting.report import report
+from charnerf.evaluation.attention import AttentionProfile
+from charnerf.evaluation.records import write_record
+from charnerf.reporting.folder_report import report
 
 AZIMUTHS = [float(azimuth) for azimuth in range(0, 360, 30)]
 
@@ -38,7 +39,7 @@ def run(evaluated, tmp_path):
         view_factor=0.25,
         num_points=1234,
     )
-    write_profile(folder / "attention.json", profile)
+    write_record(folder / "attention.json", profile)
     return folder
 
 

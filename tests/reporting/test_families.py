@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.reporting.blocks import Heading, Table, Text
-from charnerf.reporting.comparison import comparison, families, shown_rows, sorted_rows
-from charnerf.reporting.rows import Run, group_rows
-from charnerf.reporting.verdicts import questions, significance
+from charnerf.reporting.comparison import comparison
+from charnerf.reporting.document import Heading, Table, Text
+from charnerf.reporting.families import families, shown_rows, sorted_rows
+from charnerf.reporting.rows import group_rows
+from charnerf.reporting.runs import Run
+from charnerf.reporting.significance import questions_of, significance
 
 KEYS = ("psnr", "psnr_foreground", "ssim", "silhouette_iou")
 SIX = ("pixelnerf", "single_encoder", "no_mha", "no_mha_depth", "no_view", "charnerf")
@@ -58,7 +60,7 @@ def test_two_losses_are_two_tables_each_in_the_papers_order(twice):
 
 
 def test_each_table_is_compared_in_itself_and_row_by_row_with_the_other(twice):
-    asked = questions(twice)
+    asked = questions_of(twice)
     assert [(one.title, len(one.pairs)) for one in asked] == [
         ("", 15),
         ("loss=opacity", 15),
@@ -87,7 +89,7 @@ def test_the_papers_figures_do_not_stand_in_a_search(search):
 
 
 def test_many_rows_are_compared_with_the_one_without_a_change(search):
-    (asked,) = questions(search)
+    (asked,) = questions_of(search)
     assert asked.title == "every row against charnerf"
     assert len(asked.pairs) == 10 and {pair[1] for pair in asked.pairs} == {"charnerf"}
 

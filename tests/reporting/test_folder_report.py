@@ -9,7 +9,8 @@ import yaml
 from charnerf.errors import DataError
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.reporting.folder_report import write_folder_report
-from charnerf.reporting.rows import group_rows, read_runs, read_unfinished
+from charnerf.reporting.rows import group_rows
+from charnerf.reporting.runs import read_runs, read_unfinished
 
 CURVE = (
     "step,phase,seconds,rays,val_psnr,val_psnr_foreground,val_ssim\n0,0,0,0,12,5,0.7\n90,0,{},9,20,14,0.85\n"

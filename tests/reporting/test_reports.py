@@ -6,7 +6,7 @@ import pytest
 
 from charnerf.errors import DataError
 from charnerf.reporting.folder_report import write_folder_report
-from charnerf.reporting.plots import read_curve
+from charnerf.reporting.run_files import read_curve
 from charnerf.reporting.run_report import write_run_report
 
 CURVE = """step,phase,seconds,rays,val_psnr,val_psnr_foreground,val_ssim,loss/rgb

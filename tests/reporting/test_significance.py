@@ -1,87 +1,68 @@
-import numpy as np
+from pathlib import Path
+
 import pytest
-import scipy.stats
 
-from charnerf.reporting.significance import bootstrap_means, compare_rows, holm, paired_bootstrap
+from charnerf.reporting.rows import Row
+from charnerf.reporting.runs import Run
+from charnerf.reporting.significance import (
+    attention_verdict,
+    differences,
+    scores_by_character,
+    sentence,
+    significance,
+)
 
-
-def test_means_of_two_values_are_binomial():
-    means = bootstrap_means([0.0, 1.0], resamples=40_000, seed=3)
-    shares = [float((means == value).mean()) for value in (0.0, 0.5, 1.0)]
-    assert shares == pytest.approx([0.25, 0.5, 0.25], abs=0.01)
-
-
-def test_means_have_the_variance_of_the_plug_in_distribution():
-    values = np.random.default_rng(0).normal(size=(30, 2))
-    means = bootstrap_means(values, resamples=20_000)
-    assert means.mean(0) == pytest.approx(values.mean(0), abs=0.01)
-    assert means.var(0) == pytest.approx(values.var(0) / 30, rel=0.05)
-    both = np.corrcoef(means.T)[0, 1]  # columns are drawn together
-    assert both == pytest.approx(np.corrcoef(values.T)[0, 1], abs=0.05)
+KEYS = ("psnr", "psnr_foreground", "ssim", "silhouette_iou")
 
 
-def test_interval_is_scipys_percentile_interval():
-    values = np.random.default_rng(1).normal(0.3, 1.0, size=15)
-    ours = paired_bootstrap(values)
-    theirs = scipy.stats.bootstrap(
-        (values,), np.mean, n_resamples=10_000, method="percentile", rng=np.random.default_rng(5)
-    ).confidence_interval
-    assert (ours.low, ours.high) == pytest.approx((theirs.low, theirs.high), abs=0.04)
-    assert ours.mean == pytest.approx(values.mean())
+def row(name, *gains, characters=12):
+    """A row whose characters differ by far more than rows do; one gain a seed."""
+    runs = []
+    for seed, gain in enumerate(gains):
+        scores = {f"c{number}": dict.fromkeys(KEYS, 3.0 * number + gain) for number in range(characters)}
+        runs.append(Run(Path(name), name, (), {"seed": seed}, {"per_character": scores}, [], None))
+    return Row(name, name, tuple(runs))
 
 
-def test_p_value_agrees_with_the_t_test_for_many_characters():
-    values = np.random.default_rng(2).normal(0.15, 1.0, size=200)
-    assert paired_bootstrap(values).p_value == pytest.approx(
-        scipy.stats.ttest_1samp(values, 0.0).pvalue, abs=0.01
+def test_seeds_are_averaged_before_pairing():
+    assert scores_by_character(row("charnerf", 1.0, 3.0), "psnr")["c2"] == 8.0
+
+
+@pytest.mark.parametrize(
+    ("gain", "start", "told"),
+    [
+        (0.5, "View attention earns its place here", "ahead against no_mha (PSNR, foreground PSNR, SSIM)"),
+        (-0.5, "View attention does not clearly earn", "behind against no_mha (PSNR, foreground PSNR, SSIM)"),
+        (
+            0.0,
+            "View attention does not clearly earn",
+            "undecided against no_mha (PSNR, foreground PSNR, SSIM)",
+        ),
+    ],
+)
+def test_the_question_of_the_table_is_answered(gain, start, told):
+    rows = [row("no_mha", 0.0), row("charnerf", gain)]
+    verdict = attention_verdict(rows, differences(rows))
+    assert verdict is not None and verdict.startswith(start) and told in verdict
+
+
+def test_a_grid_without_the_papers_rows_does_not_answer_it():
+    rows = [row("a", 0.0), row("b", 1.0)]
+    assert attention_verdict(rows, differences(rows)) is None
+
+
+def test_sentences_say_who_is_ahead_and_what_is_open():
+    rows = [row("a", 0.0), row("b", 1.0), row("c", 1.0)]
+    found = differences(rows)["psnr"]
+    assert sentence("psnr", found, ["a", "b", "c"]) == (
+        "PSNR: b is ahead of a by 1.00 dB; c is ahead of a by 1.00 dB; the other 1 of 3 pairs can not be told apart."
     )
+    assert sentence("ssim", [], []) == "SSIM: no difference holds (0 pairs)."
 
 
-def test_p_value_inverts_the_interval():
-    generator = np.random.default_rng(4)
-    for shift in (0.0, 0.2, 0.4, 0.6, 0.8):
-        found = paired_bootstrap(generator.normal(shift, 1.0, size=20))
-        if abs(found.p_value - 0.05) > 0.002:
-            assert (found.low > 0.0 or found.high < 0.0) == (found.p_value < 0.05)
-
-
-def test_few_characters_can_not_say_more_than_their_signs():
-    assert paired_bootstrap([1.0, 1.1]).p_value == 0.5
-    assert paired_bootstrap([1.0] * 12).p_value == pytest.approx(2.0**-11)
-    assert paired_bootstrap([0.0, 0.0, 0.0]).p_value == 1.0
-    assert paired_bootstrap([1.0]).p_value == 1.0
-    with pytest.raises(ValueError, match="found shape"):
-        paired_bootstrap([])
-
-
-def test_the_same_seed_gives_the_same_interval():
-    assert paired_bootstrap([1.0, -0.5, 0.3], seed=1) == paired_bootstrap([1.0, -0.5, 0.3], seed=1)
-
-
-def test_holm_on_hand_numbers():
-    # smallest times 4, next times 3, ..., never falling
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.4, 0.9]) == [0.8, 0.9]
-    assert holm([0.6, 0.7]) == [1.0, 1.0]
-    assert holm([]) == []
-
-
-def test_rows_are_paired_by_character_and_the_better_one_comes_first():
-    names = [f"c{number}" for number in range(12)]
-    hard = dict(zip(names, np.random.default_rng(0).normal(20.0, 5.0, size=12), strict=True))
-    better = {name: value + 0.2 + 0.01 * number for number, (name, value) in enumerate(hard.items())}
-    noisy = {name: value + (-1) ** number for number, (name, value) in enumerate(hard.items())}
-    found = {
-        frozenset((one.first, one.second)): one for one in compare_rows({"a": hard, "b": better, "c": noisy})
-    }
-    sure = found[frozenset("ab")]
-    assert (sure.first, sure.second, sure.holds) == ("b", "a", True)  # 5 dB between characters cancel
-    assert sure.mean == pytest.approx(0.255)
-    assert sure.p_value == pytest.approx(3 * 2.0**-11)  # Holm over three pairs
-    assert not found[frozenset("ac")].holds
-
-
-def test_rows_without_a_common_character_are_not_compared():
-    assert compare_rows({"a": {"x": 1.0}, "b": {"y": 1.0}}) == []
-    only = compare_rows({"a": {"x": 1.0, "y": 5.0}, "b": {"y": 1.0}})
-    assert (only[0].num_characters, only[0].mean) == (1, 4.0)
+def test_too_few_characters_are_told():
+    texts = [
+        block.text for block in significance([row("a", 0.0, characters=4), row("b", 1.0, characters=4)])[1:3]
+    ]
+    assert "p is at least 0.12" in texts[1]
+    assert significance([row("a", 0.0)]) == []

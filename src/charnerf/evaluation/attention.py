@@ -4,26 +4,22 @@ Source: paper, Analysis of multi-view feature vector combination. What the paper
 those that a camera sees, one a pixel, at the expected depth of its ray, where the picture is more opaque than not.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character
-from charnerf.data.layout import read_json
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import write_text
 from charnerf.geometry.cameras import direction_from_angles, pixel_centres, pixel_rays
 from charnerf.geometry.framing import framing_camera
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.combinators.base import masked_logits, view_weights
 from charnerf.models.combinators.view_attention import AttentionLogits, ViewAttention
-from charnerf.types import Cameras, Scene
+from charnerf.types import Cameras, Scene, SourceViews
+from charnerf.volume.renderers.base import AbstractRenderer
 
 ATTENTION_FILE = "attention.json"
 AZIMUTH_STEP_DEG = 5
@@ -59,8 +55,8 @@ class AttentionProfile:
 
 
 @dataclass(frozen=True)
-class _Call:
-    """What the combinator was given."""
+class _Inputs:
+    """What the combinator sees of points (P)."""
 
     view_features: Tensor
     view_dirs: Tensor
@@ -92,7 +88,7 @@ def view_attention_of(network: CharNeRF) -> ViewAttention:
 @torch.no_grad()
 def attention_profile(
     network: CharNeRF,
-    renderer: Any,
+    renderer: AbstractRenderer,
     characters: Sequence[Character],
     *,
     step_deg: int = AZIMUTH_STEP_DEG,
@@ -112,45 +108,50 @@ def attention_profile(
         DataError: If a camera sees nothing of a character.
     """
     combinator = view_attention_of(network)
-    device = network.box[0].device
     azimuths = [float(azimuth) for azimuth in range(0, 360, step_deg)]
-    scenes = [network.scene(network.encode(one.sources.to(device)), 0) for one in characters]
-    found, count = [], 0
+    scenes = [network.scene(network.encode(one.sources.to(network.device)), 0) for one in characters]
+    means, num_points = [], 0
     for azimuth in azimuths:
-        camera = framing_camera(azimuth, 0.0, radius=RADIUS, size=size).to(device)
-        calls = [
+        camera = framing_camera(azimuth, 0.0, radius=RADIUS, size=size).to(network.device)
+        inputs = [
             _seen(combinator, scene, renderer, camera, one.name)
             for scene, one in zip(scenes, characters, strict=True)
         ]
         parts = [
-            mean_parts(combinator.logits(c.view_features, c.view_dirs, c.source_dirs), c.valid) for c in calls
+            mean_parts(combinator.logits(one.view_features, one.view_dirs, one.source_dirs), one.valid)
+            for one in inputs
         ]
-        found.append([torch.stack(each).mean(0).cpu() for each in zip(*parts, strict=True)])
-        count += sum(len(call.valid) for call in calls)
-    num_views = found[0][2].shape[-1]
+        means.append([torch.stack(part).mean(0).cpu() for part in zip(*parts, strict=True)])
+        num_points += sum(len(one.valid) for one in inputs)
+    num_views = means[0][2].shape[-1]
     factor = float(combinator.scale * combinator.view_scale.square() / num_views)
-    sources = network.views(characters[0].sources)
-    towards = sources.cameras.world_from_camera[0, :, :3, 2].double()
-    around = direction_from_angles(
-        torch.tensor(azimuths, dtype=torch.float64), torch.zeros(len(azimuths), dtype=torch.float64)
-    )
-    names = [*characters[0].source_names]
+    names = list(characters[0].source_names)
     names += [f"mirrored {number}" for number in range(1, num_views - len(names) + 1)]
     return AttentionProfile(
         characters=[one.name for one in characters],
         sources=names,
         azimuth_deg=azimuths,
-        features=[one[0].tolist() for one in found],
-        view=[one[1].tolist() for one in found],
-        weights=[one[2].tolist() for one in found],
-        curve=(factor * (around @ towards.T).sum(-1)).tolist(),
+        features=[features.tolist() for features, _, _ in means],
+        view=[view.tolist() for _, view, _ in means],
+        weights=[weights.tolist() for _, _, weights in means],
+        curve=_curve(azimuths, network.views(characters[0].sources), factor),
         view_factor=factor,
-        num_points=count,
+        num_points=num_points,
     )
 
 
-def _seen(combinator: ViewAttention, scene: Scene, renderer: Any, camera: Cameras, name: str) -> _Call:
-    """What the combinator is given at the points that a camera sees, one a pixel."""
+def _curve(azimuths_deg: Sequence[float], sources: SourceViews, factor: float) -> list[float]:
+    """The view part by theory: factor times the sum over the sources of the cosine to them."""
+    azimuths = torch.tensor(azimuths_deg, dtype=torch.float64)
+    towards = sources.cameras.world_from_camera[0, :, :3, 2].double()
+    around = direction_from_angles(azimuths, torch.zeros_like(azimuths))
+    return (factor * (around @ towards.T).sum(-1)).tolist()
+
+
+def _seen(
+    combinator: ViewAttention, scene: Scene, renderer: AbstractRenderer, camera: Cameras, name: str
+) -> _Inputs:
+    """What the combinator sees of the points that a camera sees, one a pixel."""
     picture = renderer.render_camera(scene, camera).finest
     rays = pixel_rays(camera, pixel_centres(camera.width, camera.height, device=picture.depth.device))
     seen = picture.opacity > 0.5
@@ -164,34 +165,15 @@ def _seen(combinator: ViewAttention, scene: Scene, renderer: Any, camera: Camera
         scene.field(points, directions)
     return next(
         call for call in reversed(calls) if bool(call.view_dirs.any())
-    )  # not those asked without a direction
+    )  # densities may see no direction
 
 
 @contextmanager
-def _recorded(combinator: ViewAttention) -> Iterator[list[_Call]]:
-    """Collect what a combinator is given while the context lasts."""
-    calls: list[_Call] = []
-    handle = combinator.register_forward_pre_hook(lambda _, given: calls.append(_Call(*given)))
+def _recorded(combinator: ViewAttention) -> Iterator[list[_Inputs]]:
+    """Collect a combinator's inputs while the context lasts."""
+    calls: list[_Inputs] = []
+    handle = combinator.register_forward_pre_hook(lambda _, inputs: calls.append(_Inputs(*inputs)))
     try:
         yield calls
     finally:
         handle.remove()
-
-
-def write_profile(path: Path, profile: AttentionProfile) -> None:
-    """Write a profile as JSON, in one step."""
-    write_text(path, json.dumps(asdict(profile)) + "\n")
-
-
-def read_profile(path: Path) -> AttentionProfile:
-    """Read a profile.
-
-    Raises:
-        DataError: If it is missing or another file.
-    """
-    try:
-        return AttentionProfile(**read_json(path))
-    except TypeError as error:
-        raise DataError(
-            f"{path}: found other keys ({error}), expected an attention profile; remove the file."
-        ) from error

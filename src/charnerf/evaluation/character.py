@@ -27,7 +27,6 @@ from charnerf.types import LeftOut, RenderOutput, Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 OURS = "ours"
-BASELINES = ("white", "visual_hull", "nearest")
 MakeMesh = Callable[[Scene, SourceViews], BuiltMesh]
 """From a scene and its drawings (B = 1) to its mesh."""
 
@@ -100,15 +99,7 @@ def measure_character(
             answers["visual_hull"] = _visual_hull(character, frames, watch)
         if nearest is not None:
             answers["nearest"] = _nearest(nearest, character, frames)
-    truth = None if character.mesh_file is None else true_points(character.mesh_file)
-    images = character.images(frames)
-    angles = view_angles(character.cameras[list(frames)], character.sources).records()
-    scores = {}
-    for method, answer in answers.items():
-        views, reasons = score_views(answer.pictures, images)
-        views = [{**metrics, **angle} for metrics, angle in zip(views, angles, strict=True)]
-        surface, missing = _surface_scores(answer.surface, truth, character)
-        scores[method] = MethodScores(views, surface, {**reasons, **missing})
+    scores = _scores(answers, character, frames)
     if baselines and nearest is None:
         scores["nearest"] = missing_scores(NO_TRAINING_SET if training is None else NO_MATCH)
     return CharacterResult(
@@ -173,6 +164,22 @@ def _visual_hull(character: Character, frames: Sequence[int], watch: Stopwatch) 
 def _nearest(nearest: Nearest, character: Character, frames: Sequence[int]) -> _Answer:
     drawn = NearestBaseline(nearest, character.sources)
     return _Answer([drawn.render(character.cameras[index]) for index in frames], nearest.mesh)
+
+
+def _scores(
+    answers: Mapping[str, _Answer], character: Character, frames: Sequence[int]
+) -> dict[str, MethodScores]:
+    """Every metric of every method."""
+    truth = None if character.mesh_file is None else true_points(character.mesh_file)
+    images = character.images(frames)
+    angles = view_angles(character.cameras[list(frames)], character.sources).records()
+    scores = {}
+    for method, answer in answers.items():
+        views, reasons = score_views(answer.pictures, images)
+        views = [{**metrics, **angle} for metrics, angle in zip(views, angles, strict=True)]
+        surface, missing = _surface_scores(answer.surface, truth, character)
+        scores[method] = MethodScores(views, surface, {**reasons, **missing})
+    return scores
 
 
 def _surface_scores(

@@ -1,6 +1,7 @@
 """A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,9 +42,9 @@ def evaluate(
         views: Fixed views a character, evenly chosen among its frames, or "all".
         output: Folder for the predictions, `images/NAME/000.png` (RGBA, named like the data set's), one contact
             sheet a character, `images/NAME/sheet.png`, and every view's metrics, `views.csv`; None keeps none.
-        mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them null.
-        baselines: Whether to measure `white`, `visual_hull` and `nearest` too.
-        training: Characters that the model was trained on, for the baseline `nearest`; None leaves it null.
+        mesh: As `measure_character` takes it; without it figures of surfaces are null.
+        baselines: As `measure_character` takes it.
+        training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
         progress: Whether to draw a progress bar with the time left.
 
@@ -54,6 +55,7 @@ def evaluate(
         DataError: If the split is unknown or empty, or a file is missing or wrong.
         NumericalError: If a prediction is not finite; the message names the picture.
     """
+    measure = partial(measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training)
     names = names_of(read_dataset(root), split)
     results = []
     with tqdm(total=0, desc=f"evaluate {split}", unit="view", disable=not progress) as bar:
@@ -61,16 +63,7 @@ def evaluate(
             character = load_character(root, name)
             frames = fixed_views(character, views)
             bar.total = bar.n + len(frames) * (len(names) - place)  # the others are taken to have as many
-            result = measure_character(
-                network,
-                renderer,
-                character,
-                frames,
-                mesh=mesh,
-                baselines=baselines,
-                training=training,
-                on_picture=bar.update,
-            )
+            result = measure(character, frames, on_picture=bar.update)
             if output is not None:
                 save_pictures(output / "images" / name, character, frames, result.pictures)
             results.append(replace(result, pictures={}))  # of one character at a time: they take memory

@@ -5,20 +5,16 @@ sampled alike, whatever its own renderer does: NUM_SAMPLES even samples on the p
 in each bin, the finest field. Letters: R rays, S samples a ray, Q shares of the rays, D bins of distance.
 """
 
-import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character
-from charnerf.data.layout import read_json
 from charnerf.errors import DataError
 from charnerf.evaluation.frames import fixed_views
-from charnerf.files import write_text
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
@@ -26,7 +22,7 @@ from charnerf.geometry.sampling import stratified_t_vals
 from charnerf.models.charnerf import CharNeRF
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.raycast import RayCaster
-from charnerf.types import RayBundle, Scene
+from charnerf.types import RayBundle, Scene, TensorRecord
 from charnerf.volume.compositing import expected_depth, weights_from_densities
 from charnerf.volume.renderers.base import AbstractRenderer
 
@@ -74,15 +70,14 @@ class RayWeights:
 
 
 @dataclass(frozen=True)
-class _Rays:
-    """What is kept of rays (R,): entropy, expected and true depth, hull's depth, m; histogram (R, D); the mesh's rays in all."""
+class _OpaqueRays(TensorRecord):
+    """Of rays (R,): entropy, expected depth, true depth and the hull's depth, m (NaN without a hull); histogram (R, D)."""
 
     entropy: Tensor
     depth: Tensor
     truth: Tensor
     hull: Tensor
     histogram: Tensor
-    num_asked: int
 
 
 def normalised_entropy(weights: Tensor) -> Tensor:
@@ -117,7 +112,7 @@ def ray_weights(
 
     Args:
         network: In eval mode.
-        renderer: Its renderer, asked only where a ray is inside the hull.
+        renderer: Its renderer, for the part of a ray inside the hull.
         characters: Of a test split; those without a mesh are passed over.
         views: Cameras a character, the first of its fixed test views.
         size: Rays across a picture, at most: every n-th pixel.
@@ -126,47 +121,52 @@ def ray_weights(
     Raises:
         DataError: If no character has a mesh, or the model shows nothing of them.
     """
-    known = [one for one in characters if one.mesh_file is not None]
-    if not known:
+    with_mesh = [one for one in characters if one.mesh_file is not None]
+    if not with_mesh:
         raise DataError(
             "the data set has no meshes of these characters, expected some: true depth needs them."
         )
-    found = {one.name: _character(network, renderer, one, views, size, num_samples) for one in known}
-    seen = {name: rays for name, rays in found.items() if len(rays.depth)}
-    if not seen:
+    opaque, num_rays = {}, 0
+    for one in with_mesh:
+        rays, count = _character(network, renderer, one, views, size, num_samples)
+        num_rays += count
+        if len(rays.depth):
+            opaque[one.name] = rays
+    if not opaque:
+        names = ", ".join(one.name for one in with_mesh)
         raise DataError(
-            f"the model shows nothing of {', '.join(found)}, expected opaque rays; was it trained long enough?"
+            f"the model shows nothing of {names}, expected opaque rays; was it trained long enough?"
         )
-    return _summary(list(seen), list(seen.values()), sum(one.num_asked for one in found.values()))
+    return _summary(opaque, num_rays)
 
 
-def _summary(names: list[str], found: list[_Rays], num_asked: int) -> RayWeights:
-    """Means over characters; quantiles over all rays."""
-    errors = [(one.depth - one.truth).abs() for one in found]
-    hulls = [(one.hull - one.truth).abs().nanmean() for one in found if not bool(one.hull.isnan().all())]
-    shares = torch.tensor(SHARES, dtype=torch.float64)
+def _summary(opaque: Mapping[str, _OpaqueRays], num_rays: int) -> RayWeights:
+    """Means over characters, quantiles over all rays; `num_rays` meet the meshes, opaque or not."""
+    each = list(opaque.values())
+    errors = [(one.depth - one.truth).abs() for one in each]
+    hulls = [(one.hull - one.truth).abs().nanmean() for one in each if not bool(one.hull.isnan().all())]
 
     def mean(values: Sequence[Tensor]) -> float:
         return float(torch.stack([one.double().mean() for one in values]).mean())
 
     def at(values: Sequence[Tensor]) -> list[float]:
         joined = torch.cat(list(values)).double().numpy()
-        return [float(value) for value in np.quantile(joined, shares.numpy())]
+        return [float(value) for value in np.quantile(joined, SHARES)]
 
-    count = sum(len(one.depth) for one in found)
+    count = sum(len(one.depth) for one in each)
     return RayWeights(
-        characters=names,
+        characters=list(opaque),
         num_rays=count,
-        opaque_share=count / max(num_asked, 1),
-        entropy=mean([one.entropy for one in found]),
+        opaque_share=count / max(num_rays, 1),
+        entropy=mean([one.entropy for one in each]),
         depth_error_m=mean(errors),
-        depth_offset_m=mean([one.depth - one.truth for one in found]),
+        depth_offset_m=mean([one.depth - one.truth for one in each]),
         hull_depth_error_m=mean(hulls) if hulls else None,
         shares=list(SHARES),
-        entropy_at=at([one.entropy for one in found]),
+        entropy_at=at([one.entropy for one in each]),
         error_at=at(errors),
         distances_m=[round(float(value), 6) for value in 0.5 * (_edges()[1:] + _edges()[:-1])],
-        weight_at=torch.stack([one.histogram.double().mean(0) for one in found]).mean(0).tolist(),
+        weight_at=torch.stack([one.histogram.double().mean(0) for one in each]).mean(0).tolist(),
     )
 
 
@@ -181,63 +181,47 @@ def _character(
     views: int,
     size: int,
     num_samples: int,
-) -> _Rays:
-    """Rays of a character's cameras at which both are opaque."""
-    device = network.box[0].device
+) -> tuple[_OpaqueRays, int]:
+    """Rays of a character's cameras at which mesh and field are opaque, on the CPU; how many meet the mesh."""
     assert character.mesh_file is not None
     caster = RayCaster.of_surface(load_surface_mesh(character.mesh_file))
-    scene = network.scene(network.encode(character.sources.to(device)), 0)
-    parts = []
+    scene = network.scene(network.encode(character.sources.to(network.device)), 0)
+    opaque, num_rays = [], 0
     for index in fixed_views(character, views):
         camera = character.cameras[index]
         step = -(-max(camera.width, camera.height) // size)
         pixels = pixel_centres(camera.width, camera.height).to(camera.focal.dtype)[::step, ::step]
         rays = pixel_rays(camera, pixels.reshape(-1, 2))
-        truth = caster.first_hits(rays.origins.numpy(), rays.directions.numpy()).distances
-        hit = torch.from_numpy(np.flatnonzero(np.isfinite(truth)))
-        parts.append(
-            _measured(
-                scene, renderer, rays[hit].to(device), torch.from_numpy(truth)[hit].to(device), num_samples
-            )
-        )
-
-    def joined(name: str) -> Tensor:
-        return torch.cat([getattr(one, name) for one in parts]).cpu()
-
-    return _Rays(
-        entropy=joined("entropy"),
-        depth=joined("depth"),
-        truth=joined("truth"),
-        hull=joined("hull"),
-        histogram=joined("histogram"),
-        num_asked=sum(one.num_asked for one in parts),
-    )
+        truth = torch.from_numpy(caster.first_hits(rays.origins.numpy(), rays.directions.numpy()).distances)
+        hit = truth.isfinite().nonzero()[:, 0]
+        num_rays += len(hit)
+        seen, distances = rays[hit].to(network.device), truth[hit].to(network.device)
+        opaque.append(_measured(scene, renderer, seen, distances, num_samples))
+    return _OpaqueRays.joined(opaque).to("cpu"), num_rays
 
 
 def _measured(
     scene: Scene, renderer: AbstractRenderer, rays: RayBundle, truth: Tensor, num_samples: int
-) -> _Rays:
+) -> _OpaqueRays:
     """Weights along rays (R,) that meet the mesh at truth (R,), m; those that the field lets through are left out."""
-    asked = len(truth)
-    ways = renderer.occupied(scene, rays)
-    inside = (ways.length > 0).nonzero()[:, 0]
-    ways, truth = ways.take(inside), truth[inside]
-    s_vals = stratified_t_vals(torch.zeros_like(ways.length), ways.length, num_samples)
-    t_vals = occupied_to_t(ways.t_edges, ways.occupied, s_vals)
-    points = points_along(ways.rays, t_vals)
-    densities = _densities(scene, points, ways.rays.directions[:, None].expand_as(points))
-    weights, _ = weights_from_densities(densities, (ways.length[:, None] / num_samples).expand_as(t_vals))
+    seen = renderer.occupied(scene, rays)
+    inside = (seen.length > 0).nonzero()[:, 0]
+    seen, truth = seen.take(inside), truth[inside]
+    s_vals = stratified_t_vals(torch.zeros_like(seen.length), seen.length, num_samples)
+    t_vals = occupied_to_t(seen.t_edges, seen.occupied, s_vals)
+    points = points_along(seen.rays, t_vals)
+    densities = _densities(scene, points, seen.rays.directions[:, None].expand_as(points))
+    weights, _ = weights_from_densities(densities, (seen.length[:, None] / num_samples).expand_as(t_vals))
     opaque = weights.sum(-1) > OPAQUE
     weights, t_vals, truth = weights[opaque], t_vals[opaque], truth[opaque]
-    first = ways.occupied.to(torch.int8).argmax(-1, keepdim=True)
-    entry = ways.t_edges.gather(-1, first)[:, 0][opaque]
-    return _Rays(
+    first = seen.occupied.to(torch.int8).argmax(-1, keepdim=True)
+    entry = seen.t_edges.gather(-1, first)[:, 0][opaque]
+    return _OpaqueRays(
         entropy=normalised_entropy(weights),
-        depth=expected_depth(weights, t_vals, ways.t_edges[:, -1][opaque]),
+        depth=expected_depth(weights, t_vals, seen.t_edges[:, -1][opaque]),
         truth=truth,
         hull=entry if scene.hull is not None else torch.full_like(entry, torch.nan),
         histogram=_histogram(weights, t_vals - truth[:, None]),
-        num_asked=asked,
     )
 
 
@@ -259,22 +243,3 @@ def _histogram(weights: Tensor, behind: Tensor) -> Tensor:
     shares = weights / weights.sum(-1, keepdim=True)
     empty = weights.new_zeros(len(weights), len(edges) - 1)
     return empty.scatter_add(-1, place.clamp(0, len(edges) - 2), torch.where(within, shares, 0.0))
-
-
-def write_ray_weights(path: Path, found: RayWeights) -> None:
-    """Write what was measured as JSON, in one step."""
-    write_text(path, json.dumps(asdict(found)) + "\n")
-
-
-def read_ray_weights(path: Path) -> RayWeights:
-    """Read what was measured.
-
-    Raises:
-        DataError: If it is missing or another file.
-    """
-    try:
-        return RayWeights(**read_json(path))
-    except TypeError as error:
-        raise DataError(
-            f"{path}: found other keys ({error}), expected figures of ray weights; remove the file."
-        ) from error

@@ -5,16 +5,19 @@ from itertools import pairwise
 from pathlib import Path
 
 from charnerf.evaluation.angles import AZIMUTH_STEP_DEG, SOURCE_EDGES_DEG, azimuth_bin, edge_bin
-from charnerf.reporting.blocks import Block, Heading, Picture, Plot, Text
+from charnerf.evaluation.character import OURS
+from charnerf.reporting.document import Block, Heading, Picture, Plot, Text
 from charnerf.reporting.interactive import boxes_figure
 from charnerf.reporting.plots import plot_boxes
 from charnerf.reporting.rows import Row
-from charnerf.reporting.views import OURS, View
+from charnerf.reporting.run_files import View
+from charnerf.reporting.runs import Run
 
 METRICS = {"psnr": "PSNR, dB", "psnr_foreground": "foreground PSNR, dB", "ssim": "SSIM"}
 AZIMUTHS = [f"{start}°" for start in range(0, 360, AZIMUTH_STEP_DEG)]
 DISTANCES = [f"{low}-{high}°" for low, high in pairwise(SOURCE_EDGES_DEG)]
 HULL = "visual_hull"
+NO_VIEWS = "These runs kept no figures of single views (views.csv); evaluate them again with this version."
 Boxes = dict[str, dict[str, list[float]]]
 
 
@@ -30,12 +33,14 @@ def distance_name(view: View) -> str:
 
 def views_by_row(rows: Sequence[Row]) -> dict[str, list[View]]:
     """Views of every row over its seeds, and the visual hull's of the first run that has them."""
-    found = {
-        row.label: [view for run in row.runs if run.views for view in run.views.of(OURS)] for row in rows
-    }
-    hulls = [run.views.of(HULL) for row in rows for run in row.runs if run.views]
-    found["visual hull"] = next((views for views in hulls if views), [])
-    return {label: views for label, views in found.items() if views}
+    by_row = {row.label: [view for run in row.runs for view in _views_of(run, OURS)] for row in rows}
+    hulls = [_views_of(run, HULL) for row in rows for run in row.runs]
+    by_row["visual hull"] = next((views for views in hulls if views), [])
+    return {label: views for label, views in by_row.items() if views}
+
+
+def _views_of(run: Run, method: str) -> list[View]:
+    return [view for view in run.views or () if view.method == method]
 
 
 def by_angle(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str = "") -> list[Block]:
@@ -43,38 +48,18 @@ def by_angle(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str 
     views = views_by_row(rows)
     blocks: list[Block] = [Heading(f"By viewing angle{title}")]
     if not views:
-        told = (
-            "These runs kept no figures of single views (views.csv); evaluate them again with this version."
-        )
-        return [*blocks, Text(told)]
+        return [*blocks, Text(NO_VIEWS)]
     missing = [row.label for row in rows if row.label not in views]
     if missing:
         blocks.append(Text(f"Without figures of single views (views.csv): {', '.join(missing)}."))
     azimuth = "azimuth (0 front, 90 left side, 180 back)"
     distance = "angle to the nearest drawing"
-    blocks.append(
-        _plot(
-            _boxes(views, AZIMUTHS, azimuth_name),
-            AZIMUTHS,
-            folder / f"report_azimuth{suffix}.png",
-            azimuth,
-            "by azimuth",
-        )
-    )
-    seen = [
-        name
-        for name in DISTANCES
-        if any(distance_name(view) == name for each in views.values() for view in each)
-    ]
-    blocks.append(
-        _plot(
-            _boxes(views, seen, distance_name),
-            seen,
-            folder / f"report_distance{suffix}.png",
-            distance,
-            f"by {distance}",
-        )
-    )
+    boxes = _boxes(views, AZIMUTHS, azimuth_name)
+    blocks.append(_plot(boxes, AZIMUTHS, folder / f"report_azimuth{suffix}.png", azimuth, "azimuth"))
+    filled = {distance_name(view) for each in views.values() for view in each}
+    bins = [name for name in DISTANCES if name in filled]
+    boxes = _boxes(views, bins, distance_name)
+    blocks.append(_plot(boxes, bins, folder / f"report_distance{suffix}.png", distance, distance))
     return blocks
 
 
@@ -93,9 +78,9 @@ def _boxes(
     return boxes
 
 
-def _plot(boxes: dict[str, Boxes], bins: list[str], path: Path, x: str, told: str) -> Plot:
+def _plot(boxes: dict[str, Boxes], bins: list[str], path: Path, x: str, what: str) -> Plot:
     """Interactive over all metrics, still over the first."""
     title, rows = next(iter(boxes.items()))
     picture = plot_boxes(rows, path, x=x, y=title, bins=bins)
-    caption = f"PSNR of every view {told}: median, quartiles, 1.5 interquartile ranges, views beyond"
+    caption = f"PSNR of every view by {what}: median, quartiles, 1.5 interquartile ranges, views beyond"
     return Plot(boxes_figure(boxes, x=x, bins=bins), Picture(picture, caption))

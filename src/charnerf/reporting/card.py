@@ -12,8 +12,9 @@ from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.files import write_text
 from charnerf.markdown import table
-from charnerf.reporting.parts import BASELINE_NAMES, COLUMNS, cell, metric_cells, read_metrics, seconds_text
-from charnerf.reporting.plots import Curve, plot_training, read_curve
+from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, metric_cells, seconds_text
+from charnerf.reporting.plots import plot_training
+from charnerf.reporting.run_files import Curve, read_curve, read_metrics
 
 BEGIN, END = "<!-- figures: written by `charnerf card` -->", "<!-- end of figures -->"
 CURVE_PICTURE = "curve.png"

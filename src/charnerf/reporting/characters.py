@@ -3,21 +3,30 @@
 from collections.abc import Sequence
 from statistics import fmean
 
-from charnerf.reporting.blocks import Block, Heading, Table, Text
-from charnerf.reporting.parts import COLUMNS, cell
+from charnerf.reporting.document import Block, Heading, Table, Text
+from charnerf.reporting.formats import COLUMNS, cell
 from charnerf.reporting.rows import Row
-from charnerf.reporting.verdicts import scores_by_character
 
 SHOWN = ("psnr_foreground", "psnr", "silhouette_iou")
 
 
+def scores_by_character(row: Row, key: str) -> dict[str, float]:
+    """A metric of every character, averaged over the row's seeds."""
+    values: dict[str, list[float]] = {}
+    for run in row.runs:
+        for name, scores in run.metrics["per_character"].items():
+            if scores.get(key) is not None:
+                values.setdefault(name, []).append(scores[key])
+    return {name: fmean(each) for name, each in values.items()}
+
+
 def ranked(rows: Sequence[Row]) -> list[str]:
     """Characters by their mean foreground PSNR over the rows, worst first."""
-    found: dict[str, list[float]] = {}
+    values: dict[str, list[float]] = {}
     for row in rows:
         for name, value in scores_by_character(row, "psnr_foreground").items():
-            found.setdefault(name, []).append(value)
-    return sorted(found, key=lambda name: fmean(found[name]))
+            values.setdefault(name, []).append(value)
+    return sorted(values, key=lambda name: fmean(values[name]))
 
 
 def characters(rows: Sequence[Row]) -> list[Block]:
@@ -27,6 +36,6 @@ def characters(rows: Sequence[Row]) -> list[Block]:
     for key in SHOWN:
         title, form = COLUMNS[key]
         scores = {row.label: scores_by_character(row, key) for row in rows}
-        cells = [[name, *(cell(found.get(name), form) for found in scores.values())] for name in names]
+        cells = [[name, *(cell(each.get(name), form) for each in scores.values())] for name in names]
         blocks += [Text(f"{title}:"), Table(["character", *scores], cells)]
     return blocks

@@ -1,33 +1,50 @@
-"""One report over all runs below a folder: tables, diagrams, pictures, and which differences hold."""
+"""What `charnerf report` writes: the report of a run, or one over all runs below a folder."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 from charnerf.errors import DataError
 from charnerf.reporting.attention import attention, with_view_attention
-from charnerf.reporting.blocks import Block, Heading, Text
 from charnerf.reporting.by_angle import by_angle
 from charnerf.reporting.characters import characters
-from charnerf.reporting.comparison import (
-    best_row,
-    comparison,
-    costs,
-    families,
-    left_out_rows,
-    shown_rows,
-    sorted_rows,
-    unfinished,
-)
-from charnerf.reporting.drawn import drawn_matrix
-from charnerf.reporting.levels import levels
-from charnerf.reporting.matrix import matrix
-from charnerf.reporting.parts import verdict, write_report
+from charnerf.reporting.comparison import comparison, costs, unfinished
+from charnerf.reporting.document import Block, Heading, Text, write_report
+from charnerf.reporting.families import best_row, families, left_out_rows, shown_rows, sorted_rows
+from charnerf.reporting.lods import lods
+from charnerf.reporting.picture_matrix import picture_matrix
 from charnerf.reporting.ray_weights import sharpness
-from charnerf.reporting.rows import Row, Run, common_overrides, group_rows, read_runs, read_unfinished
-from charnerf.reporting.trends import trends
-from charnerf.reporting.verdicts import significance
+from charnerf.reporting.real_drawings import real_drawings
+from charnerf.reporting.rows import Row, common_overrides, group_rows
+from charnerf.reporting.run_report import verdict, write_run_report
+from charnerf.reporting.runs import Run, read_runs, read_unfinished
+from charnerf.reporting.significance import significance
+from charnerf.reporting.training_time import training_time
 
 ATTENTION_ROWS = 4  # figures of view attention in one report, at most
+
+
+def report(folder: Path, *, drawings: Path | None = None, trusted: Sequence[str] = ()) -> Path:
+    """Write report.md and report.html of a folder.
+
+    Args:
+        folder: A run, whose own report gains the attention figure and the drawings; or any folder above runs.
+        drawings: A folder of drawings to show through every row.
+        trusted: Modules of the user's own classes that the runs' configs may name.
+
+    Returns:
+        The Markdown file.
+
+    Raises:
+        DataError: If there is no run, a file is unreadable, or there are no drawings where some are asked for.
+    """
+    runs = read_runs(folder)
+    if [run.folder for run in runs] != [folder]:
+        return write_folder_report(folder, drawings=drawings, trusted=trusted)
+    rows = group_rows(runs)
+    more: list[Block] = [*sharpness(rows, folder, trusted=trusted), *attention(rows, folder, trusted=trusted)]
+    if drawings is not None:
+        more += real_drawings(rows, drawings, folder, trusted=trusted)
+    return write_run_report(folder, more=[*more, *lods(rows)])
 
 
 def write_folder_report(
@@ -60,19 +77,19 @@ def write_folder_report(
     blocks += comparison(rows)
     blocks += costs(rows)
     blocks += significance(rows)
-    blocks += trends(rows, folder)
+    blocks += training_time(rows, folder)
     for number, family in enumerate(families(rows)):
         shown = shown_rows(family.rows)
-        told = left_out_rows(family.rows, shown)
+        note = left_out_rows(family.rows, shown)
         title, suffix = f": {family.variant}" if family.variant else "", f"_{number}" if number else ""
-        blocks += [*by_angle(shown, folder, title=title, suffix=suffix), *told]
-        blocks += [*matrix(shown, folder, title=title, suffix=suffix), *told]
+        blocks += [*by_angle(shown, folder, title=title, suffix=suffix), *note]
+        blocks += [*picture_matrix(shown, folder, title=title, suffix=suffix), *note]
         if drawings is not None:
-            blocks += drawn_matrix(shown, drawings, folder, trusted=trusted, title=title, suffix=suffix)
-            blocks += told
+            blocks += real_drawings(shown, drawings, folder, trusted=trusted, title=title, suffix=suffix)
+            blocks += note
     blocks += sharpness(rows, folder, trusted=trusted)
     blocks += attention(shown_rows(with_view_attention(rows), ATTENTION_ROWS), folder, trusted=trusted)
-    blocks += levels(rows)
+    blocks += lods(rows)
     blocks += characters(rows)
     return write_report(folder, title, blocks)
 
@@ -80,8 +97,8 @@ def write_folder_report(
 def _lead(rows: Sequence[Row], runs: Sequence[Run]) -> str:
     """Which row is best, and what all of them share."""
     best = best_row(rows)
-    shared = common_overrides(runs)
-    told = f" All runs: {' '.join(shared)}." if shared else ""
+    common = common_overrides(runs)
+    overrides = f" All runs: {' '.join(common)}." if common else ""
     measured = {
         (run.metrics["split"], run.metrics["num_characters"], run.metrics["num_views"]) for run in runs
     }
@@ -90,4 +107,4 @@ def _lead(rows: Sequence[Row], runs: Sequence[Run]) -> str:
         if len(measured) > 1
         else ""
     )
-    return f"Best on the foreground: {best.label}. {verdict(best.runs[0].metrics)}{told}{mixed}"
+    return f"Best on the foreground: {best.label}. {verdict(best.runs[0].metrics)}{overrides}{mixed}"

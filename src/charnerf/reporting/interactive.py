@@ -3,19 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-PALETTE = ("#1f5fa8", "#b8601a", "#3f8f5f", "#7a4fa3", "#b03a5b", "#4d7f91", "#8a7a1f", "#555b63")
+from charnerf.reporting.plots import GRID, PALETTE, Line
+
 DASHES = ("solid", "dash", "dot", "dashdot")
-_GRID = "#e6e8eb"
-Line = tuple[Sequence[float], Sequence[float]]
 
 
-def colour(index: int) -> str:
-    """Colour of a row."""
+def _color(index: int) -> str:
+    """Color of a row."""
     return PALETTE[index % len(PALETTE)]
 
 
-def dash(index: int) -> str:
-    """Dash of a row: changes where the colours begin again."""
+def _dash(index: int) -> str:
+    """Dash of a row: changes where the colors begin again."""
     return DASHES[index // len(PALETTE) % len(DASHES)]
 
 
@@ -33,7 +32,7 @@ def _layout(**more: Any) -> dict[str, Any]:
 
 
 def _axis(title: str, **more: Any) -> dict[str, Any]:
-    return {"title": {"text": title}, "gridcolor": _GRID, "zeroline": False, "linecolor": "#9aa0a8", **more}
+    return {"title": {"text": title}, "gridcolor": GRID, "zeroline": False, "linecolor": "#9aa0a8", **more}
 
 
 def lines_figure(panels: Mapping[str, Mapping[str, Sequence[Line]]], *, x: str) -> dict[str, Any]:
@@ -64,7 +63,7 @@ def lines_figure(panels: Mapping[str, Mapping[str, Sequence[Line]]], *, x: str) 
                         "name": row,
                         "legendgroup": row,
                         "showlegend": row not in named,
-                        "line": {"color": colour(index), "dash": dash(index), "width": 1.8},
+                        "line": {"color": _color(index), "dash": _dash(index), "width": 1.8},
                         "marker": {"size": 4},
                         "xaxis": f"x{number}",
                         "yaxis": f"y{number}",
@@ -94,7 +93,7 @@ def boxes_figure(
                     "x": [name for name in bins for _ in by_bin.get(name, ())],
                     "y": [value for name in bins for value in by_bin.get(name, ())],
                     "visible": number == 0,
-                    "marker": {"color": colour(index), "size": 3},
+                    "marker": {"color": _color(index), "size": 3},
                     "line": {"width": 1.2},
                     "boxmean": True,
                 }

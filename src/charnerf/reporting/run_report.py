@@ -4,54 +4,142 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from charnerf.reporting.blocks import Block, Bullets, Code, Heading, Picture, Table, Text
-from charnerf.reporting.parts import (
-    BASELINE_NAMES,
-    COLUMNS,
-    MAX_SHEETS,
-    cell,
-    character_table,
-    metric_cells,
-    read_metrics,
-    seconds_text,
-    sheets_of,
-    verdict,
+from charnerf.reporting.document import (
+    Block,
+    Bullets,
+    Code,
+    Heading,
+    Picture,
+    Table,
+    Text,
     write_report,
 )
-from charnerf.reporting.plots import plot_angles, plot_training, read_curve
+from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, metric_cells, seconds_text
+from charnerf.reporting.plots import plot_angles, plot_training
+from charnerf.reporting.run_files import read_curve, read_metrics
+
+MAX_SHEETS = 12
+
+
+def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> Path:
+    """Write report.md and report.html of a run from its metrics.json, curve.csv, config.yaml and images/.
+
+    Args:
+        run_folder: The run; only metrics.json must be there.
+        more: Blocks to stand before what was spent.
+
+    Returns:
+        The Markdown file.
+
+    Raises:
+        DataError: If metrics.json is missing or unreadable, or curve.csv is another file.
+    """
+    folder = Path(run_folder)
+    metrics = read_metrics(folder / "metrics.json")
+    title = f"charnerf run {folder.name}"
+    blocks: list[Block] = [Heading(title, 1), Text(verdict(metrics), lead=True), _headline(metrics)]
+    worst_first = _worst_first(metrics)
+    sheets = _sheets(folder, worst_first, metrics)
+    shown = _best_middle_worst(sheets)
+    if shown:
+        blocks += [Heading("Best, middle, worst"), *(sheets[name] for name in shown)]
+    blocks += [*_curve(folder), *_angles(folder, metrics), *_characters(worst_first, metrics)]
+    rest = [sheets[name] for name in sheets if name not in shown][: MAX_SHEETS - len(shown)]
+    if rest:
+        blocks += [Heading("More characters"), *rest]
+    blocks += [*more, *_spent(metrics), *_missing(metrics), *_go_on(folder, metrics)]
+    config = folder / "config.yaml"
+    if config.is_file():
+        blocks.append(Code(config.read_text(encoding="utf-8"), folded="The composed configuration"))
+    return write_report(folder, title, blocks)
+
+
+def verdict(metrics: Mapping[str, Any]) -> str:
+    """What the run reached, and by how much it beats the better baseline."""
+    start = (
+        f"{metrics['num_characters']} characters of the {metrics['split']} split, "
+        f"{metrics['num_views']} views: "
+        f"{cell(metrics['psnr'], '{:.2f}')} dB PSNR, "
+        f"{cell(metrics['psnr_foreground'], '{:.2f}')} dB on the foreground"
+    )
+    gains = []
+    for key, unit, form in (
+        ("psnr", "dB PSNR", "{:+.2f}"),
+        ("psnr_foreground", "dB foreground", "{:+.2f}"),
+        ("ssim", "SSIM", "{:+.3f}"),
+    ):
+        baselines = metrics.get("baselines", {}).values()
+        others = [scores[key] for scores in baselines if scores.get(key) is not None]
+        if others and metrics[key] is not None:
+            gains.append(f"{form.format(metrics[key] - max(others))} {unit}")
+    return start + (f"; against the better baseline {', '.join(gains)}." if gains else ".")
 
 
 def _headline(metrics: Mapping[str, Any]) -> Table:
     """Ours beside the baselines, with seconds."""
     header = ["", *(title for title, _ in COLUMNS.values()), "encode", "a frame"]
-    rows = [("charnerf", metrics, metrics["seconds"])]
-    for name, found in metrics.get("baselines", {}).items():
-        rows.append((BASELINE_NAMES.get(name, name), found, found.get("seconds", {})))
-    cells = [
-        [
-            name,
-            *metric_cells(found),
-            seconds_text(spent.get("encode")),
-            seconds_text(spent.get("render_per_frame")),
-        ]
-        for name, found, spent in rows
-    ]
+    rows = [("charnerf", metrics)]
+    rows += [(BASELINE_NAMES.get(name, name), each) for name, each in metrics.get("baselines", {}).items()]
+    cells = []
+    for name, scores in rows:
+        spent = scores.get("seconds", {})
+        seconds = [seconds_text(spent.get(stage)) for stage in ("encode", "render_per_frame")]
+        cells.append([name, *metric_cells(scores), *seconds])
     return Table(header, cells, emphasis=True)
 
 
-def _reasons(metrics: Mapping[str, Any]) -> list[str]:
-    """Why figures are missing, one line each."""
-    lines = []
-    for where, found in (
-        ("", metrics),
-        ("seconds: ", metrics["seconds"]),
-        ("left out: ", metrics.get("left_out", {})),
-        ("environment: ", metrics.get("environment", {})),
-    ):
-        for key, value in found.items():
-            if key.endswith("_reason") and value:
-                lines.append(f"{where}{key.removesuffix('_reason')}: none, because {value}")
-    return lines
+def _worst_first(metrics: Mapping[str, Any]) -> list[str]:
+    """Names of the characters by foreground PSNR, then PSNR."""
+    scores = metrics["per_character"]
+    return sorted(
+        scores, key=lambda name: (scores[name]["psnr_foreground"] or 0.0, scores[name]["psnr"] or 0.0)
+    )
+
+
+def _sheets(folder: Path, names: Sequence[str], metrics: Mapping[str, Any]) -> dict[str, Picture]:
+    """Contact sheets that are there, in the order of the names."""
+    sheets = {}
+    for name in names:
+        path = folder / "images" / name / "sheet.png"
+        if path.is_file():
+            scores = metrics["per_character"][name]
+            caption = (
+                f"{name}: {cell(scores['psnr'], '{:.1f}')} dB, "
+                f"foreground {cell(scores['psnr_foreground'], '{:.1f}')} dB, "
+                f"IoU {cell(scores['silhouette_iou'], '{:.2f}')}"
+            )
+            sheets[name] = Picture(path, caption)
+    return sheets
+
+
+def _best_middle_worst(worst_first: Mapping[str, Picture]) -> list[str]:
+    """Three of the names, or as many as there are."""
+    names = list(worst_first)
+    return list(dict.fromkeys([names[-1], names[len(names) // 2], names[0]])) if names else []
+
+
+def _curve(folder: Path) -> list[Block]:
+    """Error against training seconds, or why it is missing."""
+    path = folder / "curve.csv"
+    blocks: list[Block] = [Heading("Error against training time")]
+    picture = plot_training(read_curve(path), folder / "images" / "curve.png") if path.is_file() else None
+    if picture is None:
+        return [*blocks, Text("This run has no validation figures over time (curve.csv).")]
+    return [*blocks, Picture(picture, "Validation PSNR over training seconds")]
+
+
+def _angles(folder: Path, metrics: Mapping[str, Any]) -> list[Block]:
+    """PSNR by where a view was taken from."""
+    picture = plot_angles(metrics, folder / "images" / "angles.png")
+    caption = "PSNR by azimuth, and by distance from a drawing"
+    return [Heading("By viewing angle"), Picture(picture, caption)]
+
+
+def _characters(names: Sequence[str], metrics: Mapping[str, Any]) -> list[Block]:
+    """Every metric of every character."""
+    header = ["character", *(title for title, _ in COLUMNS.values())]
+    cells = [[name, *metric_cells(metrics["per_character"][name])] for name in names]
+    return [Heading("Per character, worst first"), Table(header, cells)]
 
 
 def _spent(metrics: Mapping[str, Any]) -> list[Block]:
@@ -82,6 +170,21 @@ def _spent(metrics: Mapping[str, Any]) -> list[Block]:
     ]
 
 
+def _missing(metrics: Mapping[str, Any]) -> list[Block]:
+    """Why figures are missing, one line each."""
+    lines = []
+    for where, figures in (
+        ("", metrics),
+        ("seconds: ", metrics["seconds"]),
+        ("left out: ", metrics.get("left_out", {})),
+        ("environment: ", metrics.get("environment", {})),
+    ):
+        for key, value in figures.items():
+            if key.endswith("_reason") and value:
+                lines.append(f"{where}{key.removesuffix('_reason')}: none, because {value}")
+    return [Heading("What could not be had"), Bullets(lines)] if lines else []
+
+
 def _go_on(folder: Path, metrics: Mapping[str, Any]) -> list[Block]:
     """Commands that continue from here."""
     name = next(iter(metrics["per_character"]), "NAME")
@@ -93,66 +196,3 @@ def _go_on(folder: Path, metrics: Mapping[str, Any]) -> list[Block]:
         f"charnerf report {folder.parent}",
     ]
     return [Heading("How to go on"), Code("\n".join(commands))]
-
-
-def _chosen(sheets: Mapping[str, Picture]) -> list[str]:
-    """Best, middle and worst of the names, worst first in `sheets`."""
-    names = list(sheets)
-    return list(dict.fromkeys([names[-1], names[len(names) // 2], names[0]])) if names else []
-
-
-def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> Path:
-    """Write report.md and report.html of a run from its metrics.json, curve.csv, config.yaml and images/.
-
-    Args:
-        run_folder: The run; only metrics.json must be there.
-        more: Blocks to stand before what was spent.
-
-    Returns:
-        The Markdown file.
-
-    Raises:
-        DataError: If metrics.json is missing or unreadable, or curve.csv is another file.
-    """
-    folder = Path(run_folder)
-    metrics = read_metrics(folder / "metrics.json")
-    worst_first, table = character_table(metrics)
-    sheets = sheets_of(folder, worst_first, metrics)
-    shown = _chosen(sheets)
-    title = f"charnerf run {folder.name}"
-    blocks: list[Block] = [Heading(title, 1), Text(verdict(metrics), lead=True), _headline(metrics)]
-    if shown:
-        blocks += [Heading("Best, middle, worst"), *(sheets[name] for name in shown)]
-    blocks += _curve_blocks(folder)
-    blocks += [
-        Heading("By viewing angle"),
-        Picture(
-            plot_angles(metrics, folder / "images" / "angles.png"),
-            "PSNR by azimuth, and by distance from a drawing",
-        ),
-        Heading("Per character, worst first"),
-        table,
-    ]
-    rest = [sheets[name] for name in sheets if name not in shown][: MAX_SHEETS - len(shown)]
-    if rest:
-        blocks += [Heading("More characters"), *rest]
-    blocks += more
-    blocks += _spent(metrics)
-    reasons = _reasons(metrics)
-    if reasons:
-        blocks += [Heading("What could not be had"), Bullets(reasons)]
-    blocks += _go_on(folder, metrics)
-    config = folder / "config.yaml"
-    if config.is_file():
-        blocks.append(Code(config.read_text(encoding="utf-8"), folded="The composed configuration"))
-    return write_report(folder, title, blocks)
-
-
-def _curve_blocks(folder: Path) -> list[Block]:
-    """Error against training seconds, or why it is missing."""
-    path = folder / "curve.csv"
-    blocks: list[Block] = [Heading("Error against training time")]
-    picture = plot_training(read_curve(path), folder / "images" / "curve.png") if path.is_file() else None
-    if picture is None:
-        return [*blocks, Text("This run has no validation figures over time (curve.csv).")]
-    return [*blocks, Picture(picture, "Validation PSNR over training seconds")]

@@ -26,7 +26,7 @@ def picture_on_white(rgba: Tensor | np.ndarray) -> Image.Image:
     return Image.fromarray(bytes_on_white(to_bytes(rgba)))
 
 
-def save_matrix(
+def save_sheet(
     path: Path, columns: Sequence[str], rows: Sequence[tuple[str, Sequence[Image.Image | None]]]
 ) -> Path:
     """Write a sheet: a picture or nothing in every cell; a label's lines stand before its row.

@@ -4,7 +4,7 @@ import torch
 from PIL import Image
 
 from charnerf.errors import DataError
-from charnerf.reporting.drawn import drawn_views, find_drawings, guessed_side
+from charnerf.reporting.real_drawings import drawn_views, find_drawings, guessed_side
 
 
 def draw(path, *, arm="left", alpha=True):

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 
-from charnerf.reporting.blocks import Block, Heading, Picture, Plot, Table, Text
+from charnerf.reporting.document import Block, Heading, Picture, Plot, Table, Text
+from charnerf.reporting.formats import seconds_text
 from charnerf.reporting.interactive import lines_figure
-from charnerf.reporting.parts import seconds_text
-from charnerf.reporting.plots import Curve, curve_points, plot_lines
+from charnerf.reporting.plots import Line, plot_lines
 from charnerf.reporting.rows import Row
+from charnerf.reporting.run_files import Curve, curve_points
 
 PANELS = {
     "val_psnr": "validation PSNR, dB",
@@ -45,7 +46,7 @@ def quality_levels(curves: Sequence[Curve], key: str) -> list[float]:
     return sorted({int(value / step + 1e-9) * step for value in (bests[0], median(bests))})
 
 
-def trends(rows: Sequence[Row], folder: Path) -> list[Block]:
+def training_time(rows: Sequence[Row], folder: Path) -> list[Block]:
     """The diagram and the table of seconds to a quality."""
     blocks: list[Block] = [Heading("Error against training time")]
     panels = {title: _lines(rows, key) for key, title in PANELS.items()}
@@ -61,15 +62,17 @@ def trends(rows: Sequence[Row], folder: Path) -> list[Block]:
             header.append(f"{name} {form.format(level)}")
             for line, row in zip(cells, rows, strict=True):
                 line.append(_seconds(row, key, level))
-    told = "Training seconds until the validation figure is first reached, the median over seeds."
-    return [*blocks, Table(header, cells), Text(told)]
+    note = "Training seconds until the validation figure is first reached, the median over seeds."
+    return [*blocks, Table(header, cells), Text(note)]
 
 
-def _lines(rows: Sequence[Row], key: str) -> Mapping[str, list[tuple[list[float], list[float]]]]:
+def _lines(rows: Sequence[Row], key: str) -> Mapping[str, list[Line]]:
     """Lines of every row that has the metric, one a seed."""
-    found = {row.label: [curve_points(run.curve, key) for run in row.runs] for row in rows}
-    found = {label: [line for line in lines if line[0]] for label, lines in found.items()}
-    return {label: lines for label, lines in found.items() if lines}
+    every = {row.label: [curve_points(run.curve, key) for run in row.runs] for row in rows}
+    drawn: dict[str, list[Line]] = {
+        label: [line for line in lines if line[0]] for label, lines in every.items()
+    }
+    return {label: lines for label, lines in drawn.items() if lines}
 
 
 def _seconds(row: Row, key: str, level: float) -> str:

@@ -1,4 +1,4 @@
-"""A report as a list of blocks, written as Markdown (pictures linked) and as one HTML file (inside)."""
+"""A report as a list of blocks, written as Markdown (pictures linked) and as one HTML file (pictures inside)."""
 
 import base64
 import html
@@ -12,8 +12,13 @@ from typing import Any
 
 from PIL import Image
 
+from charnerf.files import write_text
 from charnerf.markdown import table
 
+STILL = (
+    "The diagrams of report.html are still pictures, because plotly is not installed. For ones to point at and zoom: "
+    "pip install 'charnerf[report]' (in a clone: pip install -e '.[report]'), then `charnerf report` again."
+)
 _STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f23; background: #fff; max-width: 1320px;
@@ -244,3 +249,16 @@ def to_html(title: str, blocks: Sequence[Block]) -> str:
         f"<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
         f"<body>\n{body}\n{scripts}</body>\n</html>\n"
     )
+
+
+def write_report(folder: Path, title: str, blocks: Sequence[Block]) -> Path:
+    """Write report.html and report.md; says so where plots stay still because plotly is not installed.
+
+    Returns:
+        The Markdown file.
+    """
+    if any(isinstance(block, Plot) for block in blocks) and plot_library() is None:
+        blocks = [*blocks, Text(STILL)]
+    write_text(folder / "report.html", to_html(title, blocks))
+    write_text(folder / "report.md", to_markdown(blocks, folder))
+    return folder / "report.md"

@@ -20,8 +20,8 @@ from charnerf.errors import CharNeRFError, DataError
 from charnerf.geometry.framing import SOURCE_ORDER, source_cameras
 from charnerf.inference.model import Model
 from charnerf.inference.weights import load
-from charnerf.reporting.blocks import Block, Heading, Picture, Text
-from charnerf.reporting.pictures import CELL, picture_on_white, save_matrix
+from charnerf.reporting.document import Block, Heading, Picture, Text
+from charnerf.reporting.picture_sheet import CELL, picture_on_white, save_sheet
 from charnerf.reporting.rows import Row
 from charnerf.types import SourceViews
 
@@ -48,7 +48,9 @@ def find_drawings(folder: Path) -> list[DrawnCharacter]:
     Raises:
         DataError: If there is none, or a folder holds two pictures of one view.
     """
-    found = [DrawnCharacter(path.stem.removesuffix(_COLOURS), {"front": path}) for path in _pictures(folder)]
+    characters = [
+        DrawnCharacter(path.stem.removesuffix(_COLOURS), {"front": path}) for path in _pictures(folder)
+    ]
     for sub in sorted(path for path in folder.iterdir() if path.is_dir()):
         files: dict[str, Path] = {}
         others = []
@@ -63,14 +65,16 @@ def find_drawings(folder: Path) -> list[DrawnCharacter]:
             else:
                 files[views[0]] = path
         if "front" in files:
-            found.append(DrawnCharacter(sub.name, files))
+            characters.append(DrawnCharacter(sub.name, files))
         else:
-            found += [DrawnCharacter(path.stem.removesuffix(_COLOURS), {"front": path}) for path in others]
-    if not found:
+            characters += [
+                DrawnCharacter(path.stem.removesuffix(_COLOURS), {"front": path}) for path in others
+            ]
+    if not characters:
         raise DataError(
             f"{folder}: found no drawings, expected CHARACTER/front.png (and side.png, back.png) or pictures of fronts."
         )
-    return found
+    return characters
 
 
 def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]:
@@ -83,7 +87,7 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
         DataError: If a picture can not be read or shows no figure.
     """
     cut = {view: _cut_out(path) for view, path in character.files.items()}
-    told = "" if len(cut) == len(SOURCE_ORDER) else f"drawn: {', '.join(cut)}"
+    assumed = "" if len(cut) == len(SOURCE_ORDER) else f"drawn: {', '.join(cut)}"
     if "back" not in cut:
         cut["back"] = cut["front"][:, ::-1].copy()
     if "side" not in cut:
@@ -100,7 +104,7 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
         present=~flags,
         mirrored=flags.clone(),
     )
-    return views, told
+    return views, assumed
 
 
 def guessed_side(front: np.ndarray) -> np.ndarray:
@@ -122,7 +126,7 @@ def guessed_side(front: np.ndarray) -> np.ndarray:
     return side
 
 
-def drawn_matrix(
+def real_drawings(
     rows: Sequence[Row],
     drawings: Path,
     folder: Path,
@@ -131,7 +135,7 @@ def drawn_matrix(
     title: str = "",
     suffix: str = "",
 ) -> list[Block]:
-    """The sheet of drawings through the first run of every row; rows whose weights are gone are told.
+    """The sheet of drawings through the first run of every row; rows whose weights are gone are named.
 
     The suffix is that of the picture's name.
 
@@ -155,27 +159,27 @@ def drawn_matrix(
         except CharNeRFError as error:
             problems.append(f"{character.name} is left out: {error}")
     if lines:
-        path = save_matrix(folder / f"report_drawings{suffix}.png", [*SOURCE_ORDER, *models], lines)
+        path = save_sheet(folder / f"report_drawings{suffix}.png", [*SOURCE_ORDER, *models], lines)
         blocks.append(Picture(path, "Drawings through every row, seen from azimuth 30 and 150 degrees"))
-    told = (
+    note = (
         "No truth exists for these. A back that is not drawn is the mirrored front, a side that is not drawn a guess from the"
         " front's widths: both are shown as the models got them. Their licences are told where they lie, not here."
     )
-    return [*blocks, Text(told), *(Text(problem) for problem in problems)]
+    return [*blocks, Text(note), *(Text(problem) for problem in problems)]
 
 
 def _lines(
     character: DrawnCharacter, models: Mapping[str, Model]
 ) -> list[tuple[str, list[Image.Image | None]]]:
     """One line for every azimuth; the drawings stand in the first."""
-    given: dict[int, tuple[SourceViews, str]] = {}
+    by_size: dict[int, tuple[SourceViews, str]] = {}
     heroes = []
     for model in models.values():
         size = model.image_size
-        if size not in given:
-            given[size] = drawn_views(character, size)
-        heroes.append(model.encode_views(given[size][0]))
-    views, told = given[max(given)]
+        if size not in by_size:
+            by_size[size] = drawn_views(character, size)
+        heroes.append(model.encode_views(by_size[size][0]))
+    views, assumed = by_size[max(by_size)]
     shown: list[Image.Image | None] = [picture_on_white(image.permute(1, 2, 0)) for image in views.images[0]]
     lines: list[tuple[str, list[Image.Image | None]]] = []
     for azimuth in SHOWN:
@@ -183,15 +187,15 @@ def _lines(
             picture_on_white(hero.render(azimuth_deg=azimuth, elevation_deg=10.0, size=CELL))
             for hero in heroes
         ]
-        label = f"{character.name}\n{azimuth:.0f}°\n{'' if lines else told}"
+        label = f"{character.name}\n{azimuth:.0f}°\n{'' if lines else assumed}"
         lines.append((label, [*([None] * len(shown) if lines else shown), *pictures]))
     return lines
 
 
 def _pictures(folder: Path) -> list[Path]:
     """Pictures of a folder that are no masks, by name."""
-    found = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in PICTURES]
-    return [path for path in found if not path.stem.endswith(_MASK)]
+    files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in PICTURES]
+    return [path for path in files if not path.stem.endswith(_MASK)]
 
 
 def _cut_out(path: Path) -> np.ndarray:

@@ -7,15 +7,15 @@ from typing import Any
 
 from charnerf.errors import DataError
 from charnerf.meshing.lod import PAPER
-from charnerf.reporting.blocks import Block, Heading, Table
-from charnerf.reporting.parts import NONE, cell, seconds_text
+from charnerf.reporting.document import Block, Heading, Table
+from charnerf.reporting.formats import NONE, cell, seconds_text
 from charnerf.reporting.rows import Row
 
 LODS_FILE = "lods.json"  # `charnerf mesh --lod` writes it
 _KEYS = ("file", "grid", "faces_asked", "vertices", "faces", "parts", "chamfer_mm", "seconds")
 
 
-def levels(rows: Sequence[Row]) -> list[Block]:
+def lods(rows: Sequence[Row]) -> list[Block]:
     """The table over all lods.json below the runs; nothing where there is none.
 
     Raises:
@@ -50,12 +50,11 @@ def _seed(row: Row, place: int) -> str:
 def _read(path: Path) -> list[dict[str, Any]]:
     """Levels of a file, finest first."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        return [{key: level[key] for key in _KEYS} for level in found]
+        levels = json.loads(path.read_text(encoding="utf-8"))
+        return [{key: level[key] for key in _KEYS} for level in levels]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        told = f"{type(error).__name__}: {error}"
         raise DataError(
-            f"{path}: can not be read ({told}), expected what `charnerf mesh --lod` writes; remove it."
+            f"{path}: can not be read ({type(error).__name__}: {error}), expected what `charnerf mesh --lod` writes; remove it."
         ) from error
 
 

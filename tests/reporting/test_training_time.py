@@ -1,6 +1,6 @@
 import pytest
 
-from charnerf.reporting.trends import quality_levels, time_to_quality
+from charnerf.reporting.training_time import quality_levels, time_to_quality
 
 CURVE = [
     {"seconds": 10.0, "val_psnr": 10.0},

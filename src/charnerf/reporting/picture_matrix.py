@@ -9,17 +9,18 @@ from PIL import Image
 from charnerf.data.characters import Character, load_character
 from charnerf.errors import DataError
 from charnerf.evaluation.angles import view_angles
-from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.characters import ranked
-from charnerf.reporting.pictures import open_on_white, picture_on_white, save_matrix
-from charnerf.reporting.rows import Row, Run, data_root
+from charnerf.reporting.document import Block, Heading, Picture, Text
+from charnerf.reporting.picture_sheet import open_on_white, picture_on_white, save_sheet
+from charnerf.reporting.rows import Row
+from charnerf.reporting.runs import Run, data_root
 
 CHARACTERS = 4
 AZIMUTHS = (45.0, 270.0)  # between two drawings, and the side that none shows
 LEVEL_WEIGHT = 0.5  # of a degree of elevation against one of azimuth when a view is chosen
 
 
-def matrix(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str = "") -> list[Block]:
+def picture_matrix(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str = "") -> list[Block]:
     """The sheet of test characters, evenly from the worst to the best, in two views each; the suffix is of the file's name."""
     runs = [row.runs[0] for row in rows]
     names = [name for name in ranked(rows) if all((run.folder / "images" / name).is_dir() for run in runs)]
@@ -36,7 +37,7 @@ def matrix(rows: Sequence[Row], folder: Path, *, title: str = "", suffix: str = 
     views = max(len(character.source_names) for character in opened)
     columns = [*opened[0].source_names, *[""] * (views - len(opened[0].source_names)), "truth"]
     lines = [line for character in opened for line in _lines(character, runs, views)]
-    path = save_matrix(folder / f"report_matrix{suffix}.png", [*columns, *(row.label for row in rows)], lines)
+    path = save_sheet(folder / f"report_matrix{suffix}.png", [*columns, *(row.label for row in rows)], lines)
     caption = (
         "Drawings, truth and every row; characters from the worst to the best, the first seed of each row"
     )
@@ -56,10 +57,10 @@ def _lines(
     lines: list[tuple[str, list[Image.Image | None]]] = []
     for index in chosen_views(character, runs, angles.azimuth_deg, angles.elevation_deg):
         stem = character.image_files[index].stem
-        told = f"{float(angles.azimuth_deg[index]):.0f}°, up {float(angles.elevation_deg[index]):.0f}°"
+        angle = f"{float(angles.azimuth_deg[index]):.0f}°, up {float(angles.elevation_deg[index]):.0f}°"
         pictures = [open_on_white(run.folder / "images" / character.name / f"{stem}.png") for run in runs]
         truth = open_on_white(character.image_files[index])
-        lines.append((f"{character.name}\n{told}", [*(empty if lines else drawings), truth, *pictures]))
+        lines.append((f"{character.name}\n{angle}", [*(empty if lines else drawings), truth, *pictures]))
     return lines
 
 
@@ -72,10 +73,10 @@ def chosen_views(
         for index, file in enumerate(character.image_files)
         if all((run.folder / "images" / character.name / f"{file.stem}.png").is_file() for run in runs)
     ]
-    found: list[int] = []
+    chosen: list[int] = []
     for wanted in AZIMUTHS:
-        free = [index for index in there if index not in found]
+        free = [index for index in there if index not in chosen]
         if free:
             away = ((azimuth_deg[free] - wanted + 180.0) % 360.0 - 180.0).abs()
-            found.append(free[int((away + LEVEL_WEIGHT * elevation_deg[free].abs()).argmin())])
-    return found
+            chosen.append(free[int((away + LEVEL_WEIGHT * elevation_deg[free].abs()).argmin())])
+    return chosen

@@ -1,0 +1,113 @@
+"""The files that a run leaves, read: metrics.json, curve.csv and views.csv."""
+
+import csv
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from charnerf.errors import DataError
+from charnerf.evaluation.scores import METRIC_KEYS
+
+_METRICS_KEYS = (
+    *METRIC_KEYS,
+    "split",
+    "num_characters",
+    "num_views",
+    "by_azimuth",
+    "per_character",
+    "seconds",
+)
+_VIEW_WORDS = ("method", "character", "view")
+
+Curve = list[dict[str, float]]
+"""Rows of a curve.csv: validation figures by training seconds."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One view by one method: numbers by column, those that could not be had left out."""
+
+    method: str
+    character: str
+    view: str
+    numbers: dict[str, float]
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Content of a metrics.json.
+
+    Raises:
+        DataError: If it is missing, no JSON, or lacks the metrics.
+    """
+    try:
+        metrics = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise DataError(
+            f"{path}: no such file, expected a finished evaluation; run `charnerf evaluate`."
+        ) from error
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: is not readable JSON ({error}); run `charnerf evaluate` again.") from error
+    missing = [key for key in _METRICS_KEYS if not isinstance(metrics, dict) or key not in metrics]
+    if missing:
+        raise DataError(f"{path}: lacks {', '.join(missing)}; run `charnerf evaluate` again.")
+    return dict(metrics)
+
+
+def read_curve(path: Path) -> Curve:
+    """Rows of a curve.csv as numbers; cells that are empty or no numbers are left out.
+
+    Raises:
+        DataError: If the file has no column `seconds`.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        reader = csv.DictReader(file)
+        if "seconds" not in (reader.fieldnames or ()):
+            columns = ", ".join(reader.fieldnames or ()) or "none"
+            raise DataError(
+                f"{path}: found the columns {columns}, expected `seconds` among "
+                "them; the run's curve.csv is another file or was cut off."
+            )
+        return [_finite_cells(row) for row in reader]
+
+
+def _finite_cells(row: Mapping[str, Any]) -> dict[str, float]:
+    """The cells of a row that are finite numbers."""
+    numbers = {}
+    for key, cell in row.items():
+        try:
+            value = float(cell)
+        except (TypeError, ValueError):
+            continue
+        if math.isfinite(value):
+            numbers[key] = value
+    return numbers
+
+
+def curve_points(curve: Curve, key: str) -> tuple[list[float], list[float]]:
+    """Seconds and values of a column, where both are there."""
+    rows = [row for row in curve if "seconds" in row and key in row]
+    return [row["seconds"] for row in rows], [row[key] for row in rows]
+
+
+def read_views(path: Path) -> list[View]:
+    """Read a views.csv.
+
+    Raises:
+        DataError: If it is unreadable or not such a table.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return [_view(row) for row in csv.DictReader(file)]
+    except (OSError, UnicodeDecodeError, csv.Error, KeyError, ValueError, TypeError) as error:
+        raise DataError(
+            f"{path}: can not be read ({type(error).__name__}: {error}), expected the table of views that an "
+            "evaluation wrote; run `charnerf evaluate` again."
+        ) from error
+
+
+def _view(row: dict[str, str]) -> View:
+    numbers = {key: float(cell) for key, cell in row.items() if key not in _VIEW_WORDS and cell != ""}
+    return View(row["method"], row["character"], row["view"], numbers)
