@@ -12,6 +12,7 @@ from skimage.measure import label
 
 from charnerf.drawings.load import Drawing
 from charnerf.errors import DataError
+from charnerf.pictures import on_white
 
 ALPHA_SHARE = 0.04  # of the pixels must be transparent for alpha to count (rounded corners do not)
 RING = 0.02  # of the longer side: the border whose colours tell the background
@@ -48,7 +49,7 @@ def cut_out(drawing: Drawing) -> Cutout:
     Raises:
         DataError: If the border is not plain or no figure remains.
     """
-    if _alpha_tells(drawing.rgba[..., 3]):
+    if has_alpha(drawing.rgba[..., 3]):
         rgba, notes = drawing.rgba.copy(), ["cut out by its alpha"]
         rgba[..., 3] *= _without_specks(rgba[..., 3] > 0.5, notes, margin=2)
     else:
@@ -62,23 +63,43 @@ def cut_out(drawing: Drawing) -> Cutout:
             "Its colours may be too near to the background's: save it with a transparent background."
         )
     touched = [name for name, line in _borders(figure).items() if line.any()]
-    if touched and not _alpha_tells(drawing.rgba[..., 3]):
+    if touched and not has_alpha(drawing.rgba[..., 3]):
         notes.append(
             f"the figure touches the picture's {', '.join(touched)} edge: if it is cropped, draw it whole"
         )
     return Cutout(rgba, tuple(notes))
 
 
-def _alpha_tells(alpha: np.ndarray) -> bool:
+def has_alpha(alpha: np.ndarray) -> bool:
     """Whether alpha separates something: some of the picture is clear, some is not."""
     clear = float((alpha < 0.5).mean())
     return ALPHA_SHARE < clear < 1.0 - 1e-4
 
 
-def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
-    """Cut out a figure from the background that its border shows."""
-    straight = drawing.rgba
-    rgb = straight[..., :3] * straight[..., 3:] + (1.0 - straight[..., 3:])
+@dataclass(frozen=True)
+class Background:
+    """What of a drawing is plain background.
+
+    Attributes:
+        mask: Connected to the border and of its colour, (H, W) bool.
+        distance: CIELAB distance of each pixel from the background's colour there, (H, W).
+        tolerance: Distance up to which a pixel is of that colour.
+        rgb: Its colour, (3,), in [0, 1].
+    """
+
+    mask: np.ndarray
+    distance: np.ndarray
+    tolerance: float
+    rgb: np.ndarray
+
+
+def find_background(drawing: Drawing) -> Background:
+    """Find the plain background that a drawing's border shows.
+
+    Raises:
+        DataError: If the border is not plain.
+    """
+    rgb = on_white(drawing.rgba)
     lab = rgb2lab(rgb)
     ring = _ring(lab.shape[:2])
     inlier = _commonest(lab[ring])
@@ -95,17 +116,24 @@ def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
     tolerance = float(np.clip(1.5 * noise, LEAST_TOLERANCE, MODE_TOLERANCE))
     regions = label(distance <= tolerance, connectivity=1)
     outside = np.unique(regions[ring & (regions > 0)])
-    background_mask = np.isin(regions, outside[outside > 0])
+    mask = np.isin(regions, outside[outside > 0])
     # a faint halo goes too, but only so far: light clothes must not leak away through a faint outline
-    figure = ~ndimage.binary_dilation(
-        background_mask,
-        mask=background_mask | (distance <= max(tolerance, HALO_TOLERANCE)),
+    mask = ndimage.binary_dilation(
+        mask,
+        mask=mask | (distance <= max(tolerance, HALO_TOLERANCE)),
         iterations=HALO_WIDTH[drawing.lossy],
     )
-    colour = (255 * np.median(rgb[ring][inlier], axis=0)).round().astype(int)
+    return Background(mask, distance, tolerance, np.median(rgb[ring][inlier], axis=0))
+
+
+def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
+    """Cut out a figure from the background that its border shows."""
+    background = find_background(drawing)
+    figure = ~background.mask
+    color = (255 * background.rgb).round().astype(int)
     notes = [
-        f"cut out from a background of about RGB {colour[0]}, {colour[1]}, {colour[2]} (tolerance "
-        f"{tolerance:.0f} in CIELAB)"
+        f"cut out from a background of about RGB {color[0]}, {color[1]}, {color[2]} (tolerance "
+        f"{background.tolerance:.0f} in CIELAB)"
     ]
     if float(figure.mean()) > FILLED_SHARE:
         raise DataError(
@@ -115,7 +143,7 @@ def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
             "background."
         )
     figure = _without_specks(figure, notes, margin=0)
-    return _soft_outline(rgb, figure), notes
+    return _soft_outline(on_white(drawing.rgba), figure), notes
 
 
 def _ring(shape: tuple[int, int]) -> np.ndarray:

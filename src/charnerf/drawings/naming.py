@@ -1,0 +1,198 @@
+"""Which view each figure of a sheet is: by likeness of outlines, symmetry, faces and feet, and the order they stand in.
+
+Letters: N figures, S side of a canvas.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise, permutations
+
+import numpy as np
+from scipy import ndimage
+from skimage.color import rgb2lab
+
+from charnerf.drawings.viewpoints import Viewpoint, viewpoint
+from charnerf.reconciling.agreement import iou
+
+HEAD, FEET, SHINS = (0.0, 0.22), (0.93, 1.0), (0.75, 0.9)  # shares of the height from the top
+TURNS = {  # views of a sheet by how many there are, in the order in which a figure turns
+    2: (("front", "side"), ("front", "back")),
+    3: (("front", "side", "back"), ("front", "three-quarter", "side"), ("front", "three-quarter", "back")),
+    4: (("front", "three-quarter", "side", "back"), ("front", "side", "back", "other side")),
+    5: (("front", "three-quarter", "side", "three-quarter back", "back"),),
+}
+DOUBTFUL = 0.08  # lead of the best naming over the next one below which the user is asked to look
+LAYOUT_WEIGHT = 0.1
+FIRST_WEIGHT = 0.25  # of a front that stands before the back
+HALVES_WEIGHT = 4.0
+HEAD_WEIGHT = 4.0  # of rows that show the head: a face tells front from back, clothes often do not
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What each figure was taken for.
+
+    Attributes:
+        viewpoints: By figure, in the order given.
+        is_doubtful: Whether another naming is nearly as good.
+        reasons: What spoke for it, sentences.
+    """
+
+    viewpoints: tuple[Viewpoint, ...]
+    is_doubtful: bool
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Looks:
+    """What is measured of a figure: how symmetric it is, how much its head shows, which way it looks (-1 left, 1 right)."""
+
+    symmetry: float
+    width: float
+    face: float
+    direction: float
+
+
+def name_views(canvases: Sequence[np.ndarray]) -> Naming:
+    """Name figures of one character.
+
+    Args:
+        canvases: RGBA (S, S, 4) each, on one scale, floor line and axis; two to five of them.
+
+    Returns:
+        A naming that uses each view once, front among them.
+    """
+    looks = [_looks(canvas) for canvas in canvases]
+    scored = []
+    for roles in TURNS[len(canvases)]:
+        for order in permutations(range(len(canvases))):
+            by_role = {role: order[place] for place, role in enumerate(roles)}
+            scored.append(
+                (_score(by_role, canvases, looks) - 0.15 * TURNS[len(canvases)].index(roles), by_role)
+            )
+    scored.sort(key=lambda one: -one[0])
+    best = scored[0][1]
+    figures = {index: role for role, index in best.items()}
+    viewpoints = tuple(_viewpoint(figures[index], best, looks) for index in range(len(canvases)))
+    others = [
+        score
+        for score, by_role in scored
+        if by_role.get("front") != best["front"] or set(by_role) != set(best)
+    ]
+    lead = scored[0][0] - max(others, default=-np.inf)
+    reasons = (
+        f"heads: {', '.join(f'{one.face:.2f}' for one in looks)} (a face shows more)",
+        f"symmetry: {', '.join(f'{one.symmetry:.2f}' for one in looks)}",
+    )
+    return Naming(viewpoints, bool(lead < DOUBTFUL), reasons)
+
+
+def _viewpoint(role: str, best: dict[str, int], looks: Sequence[_Looks]) -> Viewpoint:
+    """Azimuth of a role: a figure that looks to the picture's left shows the character's left side."""
+    if role in ("front", "back"):
+        return viewpoint(role)
+    side = best.get("side")
+    to_left = looks[best[role] if side is None or role == "three-quarter" else side].direction < 0
+    if role == "other side":
+        to_left = not to_left
+    azimuth = {"side": 90.0, "other side": 90.0, "three-quarter": 45.0, "three-quarter back": 135.0}[role]
+    return Viewpoint(azimuth if to_left else 360.0 - azimuth)
+
+
+def _score(roles: dict[str, int], canvases: Sequence[np.ndarray], looks: Sequence[_Looks]) -> float:
+    """How well figures fit roles; about 1 for each piece of evidence."""
+    front = roles["front"]
+    score = looks[front].symmetry + 0.5 * _standing(looks, front, "face")
+    if "back" in roles:
+        back = roles["back"]
+        score += 2.0 * iou(canvases[front][:, ::-1, 3], canvases[back][..., 3])
+        score += looks[back].symmetry - 0.5 * _standing(looks, back, "face")
+        score += FIRST_WEIGHT * (front < back)
+        if "side" in roles:
+            side = roles["side"]
+            score += HALVES_WEIGHT * _halves(
+                canvases[front], canvases[back], canvases[side], looks[side].direction
+            )
+    for role in ("side", "other side"):
+        if role in roles:
+            score += 1.0 - looks[roles[role]].symmetry + (1.0 - _standing(looks, roles[role], "width"))
+    places = [index for _, index in sorted(roles.items(), key=lambda pair: _TURN[pair[0]])]
+    steps = sum(later > earlier for earlier, later in pairwise(places))
+    return score + LAYOUT_WEIGHT * (steps / max(1, len(places) - 1) + (front == 0))
+
+
+_TURN = {"front": 0, "three-quarter": 1, "side": 2, "three-quarter back": 3, "back": 4, "other side": 5}
+
+
+def _standing(looks: Sequence[_Looks], index: int, what: str) -> float:
+    """Where a figure stands among all of them in a measure, 0 the least to 1 the most."""
+    values = np.array([getattr(one, what) for one in looks])
+    span = values.max() - values.min()
+    return float((values[index] - values.min()) / span) if span > 1e-6 else 0.5
+
+
+def _looks(canvas: np.ndarray) -> _Looks:
+    alpha = canvas[..., 3]
+    inside = alpha > 0.5
+    rows = np.flatnonzero(inside.any(axis=1))
+    top, height = int(rows[0]), len(rows)
+
+    def band(span: tuple[float, float]) -> slice:
+        return slice(top + int(span[0] * height), top + max(int(span[1] * height), int(span[0] * height) + 1))
+
+    trunk = inside[band((0.3, 0.7))]
+    detail = _detail(canvas)
+    head = inside[band(HEAD)]
+    columns = np.arange(canvas.shape[1])
+    shown = detail[band(HEAD)] * ndimage.binary_erosion(head, iterations=2)
+    feet, shins = inside[band(FEET)], inside[band(SHINS)]
+    ahead = _middle(feet, columns) - _middle(shins, columns)
+    gaze = (shown * columns).sum() / max(shown.sum(), 1e-6) - _middle(head, columns)
+    return _Looks(
+        symmetry=iou(alpha, alpha[:, ::-1]),
+        width=float(trunk.sum(axis=1).mean() / height),
+        face=float(shown.sum() / max(ndimage.binary_erosion(head, iterations=2).sum(), 1)),
+        direction=float(np.sign(2.0 * ahead + gaze)),
+    )
+
+
+def _halves(front: np.ndarray, back: np.ndarray, side: np.ndarray, direction: float) -> float:
+    """How much better a front fits the half ahead of a side view, and a back the half behind, than swapped; within (-2, 2)."""
+    if direction > 0:
+        side = side[:, ::-1]
+    lab, inside = rgb2lab(side[..., :3]), side[..., 3] > 0.5
+    middle = np.array([_middle(row, np.arange(len(row))) for row in inside])
+    ahead = inside & (np.arange(side.shape[1]) < middle[:, None] - 0.5)
+    behind = inside & (np.arange(side.shape[1]) > middle[:, None] + 0.5)
+    rows = {name: _row_colors(lab, mask) for name, mask in (("ahead", ahead), ("behind", behind))}
+    faces = {}
+    for name, canvas in (("front", front), ("back", back)):
+        faces[name] = _row_colors(rgb2lab(canvas[..., :3]), canvas[..., 3] > 0.5)
+    there = inside.any(axis=1) & (front[..., 3] > 0.5).any(axis=1) & (back[..., 3] > 0.5).any(axis=1)
+
+    def apart(view: str, half: str) -> np.ndarray:
+        return np.minimum(np.linalg.norm(faces[view] - rows[half], axis=-1)[there], 30.0)
+
+    gain = (
+        apart("front", "behind") + apart("back", "ahead") - apart("front", "ahead") - apart("back", "behind")
+    )
+    if not there.any():
+        return 0.0
+    weights = np.where(np.arange(len(gain)) < HEAD[1] * len(gain), HEAD_WEIGHT, 1.0)
+    return float(np.average(gain, weights=weights) / 30.0)
+
+
+def _row_colors(lab: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Mean colour of each row's pixels of a mask, (S, 3)."""
+    return (lab * mask[..., None]).sum(axis=1) / np.maximum(mask.sum(axis=1), 1)[:, None]
+
+
+def _detail(canvas: np.ndarray) -> np.ndarray:
+    """How much colours change from pixel to pixel, (S, S)."""
+    lab = rgb2lab(canvas[..., :3])
+    return np.sqrt(sum(ndimage.gaussian_gradient_magnitude(lab[..., c], 1.0) ** 2 for c in range(3)))
+
+
+def _middle(mask: np.ndarray, columns: np.ndarray) -> float:
+    """Mean column of a mask's pixels."""
+    return float((mask * columns).sum() / max(mask.sum(), 1))

@@ -1,0 +1,218 @@
+"""A sheet with several figures of one character: where each is, and what beside them is none.
+
+Letters: H, W of the sheet.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+from skimage.measure import label, regionprops
+
+from charnerf.drawings.cutout import find_background, has_alpha
+from charnerf.drawings.load import Drawing
+from charnerf.errors import DataError
+
+MOST_FIGURES = 8
+JOINED = 0.0015  # share of the sheet's longer side: parts nearer to each other than this hang together
+LINE_LENGTH = (
+    0.35  # share of the sheet's side beyond which a thin straight run is a construction line or a frame
+)
+LINE_WIDTH = 0.006
+LEAST_HEIGHT = 0.5  # of the tallest candidate's: what is smaller is a detail, a swatch or text
+ALIKE = 0.2  # relative difference of heights within which figures are drawn at one scale
+SOLID = 0.93  # share of its box that a swatch or a frame fills
+MARGIN = 0.06  # of a figure's height, around it
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure of a sheet.
+
+    Attributes:
+        box: Left, top, right and bottom, pixels of the sheet as worked with; edges.
+        drawing: The figure alone with a margin of background; other figures' parts are painted over.
+    """
+
+    box: tuple[int, int, int, int]
+    drawing: Drawing
+
+
+@dataclass(frozen=True)
+class LeftAside:
+    """Something on a sheet that is no figure: its box as `Figure.box`, and what it was taken for."""
+
+    box: tuple[int, int, int, int]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What was found on a sheet.
+
+    Attributes:
+        figures: In reading order: row by row, each from the left.
+        left_aside: What was not taken for a figure.
+    """
+
+    figures: tuple[Figure, ...]
+    left_aside: tuple[LeftAside, ...]
+
+
+def find_figures(drawing: Drawing) -> Sheet:
+    """Find the figures of a sheet, however many there are.
+
+    Raises:
+        DataError: If the background is not plain, nothing stands on it, or more than MOST_FIGURES figures do.
+    """
+    ink, lines = _ink(drawing)
+    parts = label(
+        ndimage.binary_dilation(ink, iterations=max(1, round(JOINED * max(ink.shape)))), connectivity=2
+    )
+    parts[~ink] = 0
+    regions = [one for one in regionprops(parts) if one.area >= 1e-5 * ink.size]
+    if not regions:
+        raise DataError(
+            f"{drawing.name}: found nothing on its background, expected figures of a character. Check the file."
+        )
+    chosen, reasons = _choose(regions)
+    if len(chosen) > MOST_FIGURES:
+        raise DataError(
+            f"{drawing.name}: found {len(chosen)} figures, expected at most {MOST_FIGURES}: crop it to the views of one"
+            " character, or give them one by one with --view."
+        )
+    owners = _owners(regions, chosen)
+    order = _reading_order([regions[index].bbox for index in chosen])
+    figures = []
+    for place in order:
+        index = chosen[place]
+        mine = np.isin(parts, [regions[i].label for i, owner in owners.items() if owner == index])
+        figures.append(_crop(drawing, mine, ink | lines))
+    aside = [LeftAside(_box(regions[i].bbox), why) for i, why in reasons.items() if i not in owners]
+    aside += [LeftAside(_box(one.bbox), "a line") for one in regionprops(label(lines, connectivity=2))]
+    return Sheet(tuple(figures), tuple(aside))
+
+
+def _ink(drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
+    """What stands on the sheet's background, (H, W) bool, without long lines; and those lines."""
+    if has_alpha(drawing.rgba[..., 3]):
+        return _without_lines(drawing.rgba[..., 3] > 0.5)
+    background = find_background(drawing)
+    marked, lines = _without_lines(background.distance > background.tolerance)
+    if not lines.any():
+        return ~background.mask, lines
+    # lines fence in what is background between figures: with them away it hangs together with the border's
+    paper = label(~marked, connectivity=1)
+    border = np.unique(np.concatenate((paper[0], paper[-1], paper[:, 0], paper[:, -1])))
+    ink = ~(background.mask | np.isin(paper, border[border > 0]))
+    return ndimage.binary_opening(ink), lines
+
+
+def _without_lines(ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ink without long thin straight lines, and those lines."""
+    lines = np.zeros_like(ink)
+    thickest = max(2, round(LINE_WIDTH * max(ink.shape)))
+    for axis in (0, 1):
+        along = ink if axis else ink.T
+        length = max(8, round(LINE_LENGTH * along.shape[1]))
+        straight = _runs_at_least(along, length)
+        thick = ndimage.binary_opening(along, structure=np.ones((thickest + 1, 1), dtype=bool))
+        found = straight & ~thick
+        lines |= found if axis else found.T
+    return ink & ~lines, lines
+
+
+def _runs_at_least(mask: np.ndarray, length: int) -> np.ndarray:
+    """Pixels of a mask in horizontal runs of at least a length; gaps of two pixels (JPEG noise) do not end a run."""
+    closed = ndimage.binary_closing(mask, structure=np.ones((1, 3), dtype=bool))
+    runs = np.zeros_like(mask)
+    for row in np.flatnonzero(closed.sum(axis=1) >= length):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], closed[row].astype(np.int8), [0]))))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            if end - start >= length:
+                runs[row, start:end] = True
+    return runs & mask
+
+
+def _choose(regions: Sequence[object]) -> tuple[list[int], dict[int, str]]:
+    """Indices of the regions that are figures, and why the others are none."""
+    heights = np.array([one.bbox[2] - one.bbox[0] for one in regions], dtype=np.float64)  # type: ignore[attr-defined]
+    reasons: dict[int, str] = {}
+    candidates = []
+    for index, region in enumerate(regions):
+        height, width = heights[index], region.bbox[3] - region.bbox[1]  # type: ignore[attr-defined]
+        if region.area >= SOLID * height * width:  # type: ignore[attr-defined]
+            reasons[index] = "a swatch or a panel"
+        else:
+            candidates.append(index)
+    if not candidates:
+        return [], reasons
+    best: list[int] = []
+    for reference in candidates:
+        alike = [i for i in candidates if abs(heights[i] - heights[reference]) <= ALIKE * heights[reference]]
+        weight = len(alike) * heights[reference]  # many, and tall: text is many too
+        if not best or weight > len(best) * np.median(heights[best]):
+            best = alike if heights[reference] >= LEAST_HEIGHT * heights[candidates].max() else best
+    for index in candidates:
+        if index not in best:
+            smaller = heights[index] < np.median(heights[best]) if best else True
+            reasons[index] = "a detail or text" if smaller else "a close-up"
+    return best, reasons
+
+
+def _owners(regions: Sequence[object], chosen: Sequence[int]) -> dict[int, int]:
+    """Which figure each region belongs to: small loose parts within a figure's box are the figure's."""
+    owners = {index: index for index in chosen}
+    for index, region in enumerate(regions):
+        if index in owners:
+            continue
+        row, column = region.centroid  # type: ignore[attr-defined]
+        for figure in chosen:
+            top, left, bottom, right = regions[figure].bbox  # type: ignore[attr-defined]
+            if top <= row <= bottom and left <= column <= right:
+                owners[index] = figure
+                break
+    return owners
+
+
+def _reading_order(boxes: Sequence[tuple[int, int, int, int]]) -> list[int]:
+    """Row by row, each from the left: figures whose heights overlap by half stand in one row."""
+    rows: list[list[int]] = []
+    for index in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+        top, bottom = boxes[index][0], boxes[index][2]
+        for row in rows:
+            first = boxes[row[0]]
+            if min(bottom, first[2]) - max(top, first[0]) > 0.5 * (bottom - top):
+                row.append(index)
+                break
+        else:
+            rows.append([index])
+    return [index for row in rows for index in sorted(row, key=lambda i: boxes[i][1])]
+
+
+def _crop(drawing: Drawing, mine: np.ndarray, ink: np.ndarray) -> Figure:
+    """A figure with a margin; the ink of others is painted over with the nearest background."""
+    rows, columns = np.flatnonzero(mine.any(axis=1)), np.flatnonzero(mine.any(axis=0))
+    top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+    room = max(4, round(MARGIN * (bottom - top)))
+    window = (
+        slice(max(0, top - room), min(mine.shape[0], bottom + room)),
+        slice(max(0, left - room), min(mine.shape[1], right + room)),
+    )
+    rgba = drawing.rgba[window].copy()
+    others = ndimage.binary_dilation(ink[window] & ~mine[window], iterations=3)
+    others &= ~ndimage.binary_dilation(mine[window], iterations=2)
+    ground = ~ndimage.binary_dilation(ink[window], iterations=3)
+    if others.any() and ground.any():
+        nearest = ndimage.distance_transform_edt(~ground, return_distances=False, return_indices=True)
+        rgba[others] = rgba[tuple(axis[others] for axis in nearest)]
+    box = (int(left), int(top), int(right), int(bottom))
+    alone = replace(drawing, rgba=rgba, size=(rgba.shape[1], rgba.shape[0]))
+    return Figure(box, alone)
+
+
+def _box(bbox: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom of scikit-image's top, left, bottom, right."""
+    top, left, bottom, right = bbox
+    return left, top, right, bottom

@@ -1,0 +1,137 @@
+"""Figures are found on a sheet and named; what stands beside them is left aside."""
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw, ImageFont
+
+from charnerf.drawings.align import figure_box, half_extent, place
+from charnerf.drawings.cutout import cut_out
+from charnerf.drawings.load import drawing_from_array
+from charnerf.drawings.naming import name_views
+from charnerf.drawings.sheet import find_figures
+from charnerf.drawings.viewpoints import Viewpoint, viewpoint
+from charnerf.errors import DataError
+from support.painted import paint
+
+PAPER = (250, 247, 238)
+
+
+def figure(view: str, height: int) -> Image.Image:
+    """A painted figure cut to its box, with eyes where it has a face; `right` looks to the picture's right."""
+    picture = paint("side" if view == "right" else view)
+    draw = ImageDraw.Draw(picture)
+    if view == "front":
+        for x in (-0.1, 0.1):
+            middle, down = (1.3 + x) * 400, (1.3 + 1.0 - 1.8) * 400
+            draw.ellipse((middle - 18, down - 18, middle + 18, down + 18), fill=(20, 60, 30, 255))
+    if view in ("side", "right"):
+        draw.ellipse(
+            ((1.3 - 0.16) * 400, 0.5 * 400 - 18, (1.3 - 0.07) * 400, 0.5 * 400 + 18), fill=(20, 60, 30, 255)
+        )
+        draw.rectangle(
+            ((1.3 - 0.3) * 400, 2.2 * 400, (1.3 - 0.1) * 400, 2.3 * 400), fill=(70, 40, 30, 255)
+        )  # toes
+    if view == "back":
+        draw.pieslice(
+            ((1.3 - 0.25) * 400, 0.3 * 400, (1.3 + 0.25) * 400, 0.8 * 400), 0, 360, fill=(90, 50, 20, 255)
+        )
+    if view == "right":
+        picture = picture.transpose(Image.Transpose.FLIP_LEFT_RIGHT)
+    picture = picture.crop(picture.getbbox())
+    return picture.resize((round(picture.width * height / picture.height), height), Image.Resampling.BOX)
+
+
+def sheet(
+    views, *, height=400, rows=1, lines=False, extras=True, jpeg_noise=False
+) -> tuple[np.ndarray, list]:
+    """A sheet of figures, and their boxes."""
+    columns = -(-len(views) // rows)
+    page = Image.new("RGB", (260 + 420 * columns, 160 + (height + 80) * rows), PAPER)
+    draw, boxes = ImageDraw.Draw(page), []
+    for place_, view in enumerate(views):
+        picture = figure(view, height)
+        left, top = 120 + 420 * (place_ % columns), 90 + (height + 80) * (place_ // columns)
+        page.paste(picture, (left, top), picture)
+        boxes.append((left, top, left + picture.width, top + height))
+    if extras:
+        draw.text((20, 12), "HERO, turnaround", fill=(30, 30, 30), font=ImageFont.load_default(size=30))
+        for number in range(4):
+            draw.rectangle(
+                (30 + 40 * number, page.height - 50, 60 + 40 * number, page.height - 20),
+                fill=(200, 40 * number, 90),
+            )
+    if lines:
+        for y in (90, 90 + height // 2, 90 + height):
+            draw.line((0, y, page.width, y), fill=(150, 170, 210), width=1)
+    pixels = np.asarray(page).astype(np.float64)
+    if jpeg_noise:
+        pixels += np.random.default_rng(0).normal(0.0, 2.0, pixels.shape)
+    return pixels.clip(0, 255).astype(np.uint8), boxes
+
+
+def near(found, expected) -> bool:
+    return all(abs(a - b) <= 3 for a, b in zip(found, expected, strict=True))
+
+
+@pytest.mark.parametrize("lines", [False, True])
+@pytest.mark.parametrize("jpeg_noise", [False, True])
+def test_figures_are_found_and_the_rest_is_left_aside(lines, jpeg_noise):
+    pixels, boxes = sheet(["front", "side", "back"], lines=lines, jpeg_noise=jpeg_noise)
+    found = find_figures(drawing_from_array(pixels, "sheet"))
+    assert len(found.figures) == 3
+    assert all(near(one.box, box) for one, box in zip(found.figures, boxes, strict=True))
+    reasons = {one.reason for one in found.left_aside}
+    assert "a swatch or a panel" in reasons and "a detail or text" in reasons
+    assert ("a line" in reasons) == lines
+
+
+def test_two_rows_are_read_row_by_row():
+    pixels, boxes = sheet(["front", "side", "back", "right"], rows=2)
+    found = find_figures(drawing_from_array(pixels, "sheet"))
+    assert all(near(one.box, box) for one, box in zip(found.figures, boxes, strict=True))
+
+
+def test_a_crop_holds_its_figure_alone():
+    pixels, boxes = sheet(["front", "side", "back"], lines=True)
+    for one, box in zip(find_figures(drawing_from_array(pixels, "sheet")).figures, boxes, strict=True):
+        alpha = cut_out(one.drawing).rgba[..., 3]
+        found = figure_box(alpha, "figure")
+        assert found.height == pytest.approx(box[3] - box[1], abs=3)
+        assert found.right - found.left == pytest.approx(box[2] - box[0], abs=3)
+
+
+def test_an_empty_page_is_refused():
+    with pytest.raises(DataError, match="page: found nothing on its background"):
+        find_figures(drawing_from_array(np.full((300, 300, 3), 240, np.uint8), "page"))
+
+
+def test_too_many_figures_are_refused():
+    pixels, _ = sheet(["front"] * 9, height=100, rows=3, extras=False)
+    with pytest.raises(DataError, match="found 9 figures, expected at most 8"):
+        find_figures(drawing_from_array(pixels, "crowd"))
+
+
+@pytest.mark.parametrize(
+    "order", [("front", "side", "back"), ("side", "front", "back"), ("back", "right", "front")]
+)
+def test_views_are_named_wherever_they_stand(order):
+    pixels, _ = sheet(order)
+    cut = [cut_out(one.drawing).rgba for one in find_figures(drawing_from_array(pixels, "sheet")).figures]
+    boxes = [figure_box(one[..., 3], "figure") for one in cut]
+    extent = half_extent([(one[..., 3], box) for one, box in zip(cut, boxes, strict=True)])
+    naming = name_views(
+        [place(one, box, extent=extent, size=96) for one, box in zip(cut, boxes, strict=True)]
+    )
+    names = {"side": "left", "right": "right"}
+    assert [one.name for one in naming.viewpoints] == [names.get(view, view) for view in order]
+
+
+def test_names_and_angles_of_views():
+    assert viewpoint("back") == Viewpoint(180.0) and viewpoint("right").azimuth_deg == 270.0
+    assert viewpoint("45,20") == Viewpoint(45.0, 20.0) and viewpoint(-90).name == "right"
+    assert viewpoint("45").name == "three-quarter-front" and viewpoint("30").name == "30 degrees"
+    for wrong in ("sideways", "1,2,3", "45,", ""):
+        with pytest.raises(DataError, match="expected one of front"):
+            viewpoint(wrong)
+    with pytest.raises(DataError, match="an elevation within 80"):
+        viewpoint("0,89")
