@@ -13,6 +13,7 @@ from charnerf.evaluation.timing import Stopwatch, process_peak_mib
 from charnerf.geometry.cameras import pixel_centres
 from charnerf.geometry.resizing import resized_cameras
 from charnerf.meshing.build import build_mesh
+from charnerf.meshing.options import MeshOptions
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.base import AbstractRenderer
 
@@ -70,6 +71,6 @@ def _measure(
             if work == "render":
                 renderer.render_camera(scene, camera)
             else:
-                build_mesh(scene, views, resolution=size)
+                build_mesh(scene, views, MeshOptions(resolution=size, height=None))
         peak = watch.peaks_mib().get("work", process_peak_mib())
     return PeakMemory(rise_mib=peak - before, seconds=watch.total_seconds("work"))

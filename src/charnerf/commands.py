@@ -25,14 +25,11 @@ from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.files import write_text
 from charnerf.geometry.resizing import resized_cameras
 from charnerf.inference.build import build_renderer
-from charnerf.inference.hero import TextureKind
 from charnerf.inference.model import Model
 from charnerf.inference.weights import load
 from charnerf.meshing.build import build_mesh
-from charnerf.meshing.lod import lod_table
+from charnerf.meshing.options import MeshOptions
 from charnerf.process import use_fastest_products
-from charnerf.reconstruction.folder import reconstruct as write_reconstruction
-from charnerf.reconstruction.meshes import MeshRequest, write_meshes
 from charnerf.reporting.folder_report import report as write_report
 from charnerf.reporting.run_report import write_run_report
 from charnerf.types import Cameras, SourceViews
@@ -163,7 +160,9 @@ def evaluate(
         split,
         views="all" if views == "all" else int(views),
         output=output,
-        mesh=None if resolution is None else partial(build_mesh, resolution=resolution),
+        mesh=None
+        if resolution is None
+        else partial(build_mesh, options=MeshOptions(resolution=resolution, height=None)),
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=train_seconds(model.source),
@@ -191,70 +190,6 @@ def train_seconds(weights: Path) -> float | None:
         except (OSError, ValueError, KeyError, TypeError):
             continue
     return None
-
-
-def mesh(
-    weights: Path | None,
-    data: Path,
-    character: str,
-    output: Path,
-    *,
-    request: MeshRequest,
-    device: str,
-    trust: Sequence[str],
-) -> None:
-    """Write the mesh of one character of a data set, or its levels of detail; print their table."""
-    model = load_model(weights, device=device, trust=trust)
-    hero = model.encode_views(load_character(data, character).sources)
-    done = write_meshes(hero, character, output, request)
-    for line in done.said:
-        say(line)
-    if done.lods:
-        sys.stdout.write(lod_table(done.lods) + "\n")
-
-
-def reconstruct(
-    drawings: tuple[Path, Path, Path],
-    output: Path,
-    *,
-    weights: Path | None,
-    side_is: Literal["left", "right"],
-    resolution: int,
-    faces: int,
-    frames: int,
-    size: int,
-    cameras: int,
-    smooth: int,
-    symmetric: bool,
-    refine: float | None,
-    height: float,
-    texture: TextureKind,
-    texture_size: int,
-    device: str,
-    trust: Sequence[str],
-) -> None:
-    """Reconstruct a character from front, side and back, and tell what was assumed about the drawings."""
-    front, side, back = drawings
-    done = write_reconstruction(
-        load_model(weights, device=device, trust=trust),
-        front=front,
-        side=side,
-        back=back,
-        output=output,
-        side_is=side_is,
-        resolution=resolution,
-        faces=faces,
-        frames=frames,
-        size=size,
-        num_cameras=cameras,
-        smooth=smooth,
-        symmetric=symmetric,
-        refine_seconds=refine,
-        height=height,
-        texture=texture,
-        texture_size=texture_size,
-    )
-    say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")
 
 
 def finetune(

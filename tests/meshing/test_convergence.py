@@ -13,7 +13,8 @@ from charnerf.meshing.convergence import (
     direction_spread,
     measure_convergence,
 )
-from charnerf.reconstruction.meshes import MeshRequest, write_meshes
+from charnerf.meshing.options import MeshOptions
+from charnerf.reconstruction.meshes import write_convergence, write_mesh
 from charnerf.types import Scene, SourceViews
 from support.analytic_scenes import figure, scene_of, sphere
 
@@ -77,9 +78,10 @@ def test_meshes_come_with_levels_and_cameras_where_asked(tmp_path):
     )
     flags = torch.zeros(1, 1, dtype=torch.bool)
     views = SourceViews(torch.full((1, 1, 4, 32, 32), 0.5), camera[None], ~flags, flags)
-    request = MeshRequest((32,), faces=(400,), smooth=3, symmetric=True, convergence=True)
-    done = write_meshes(Hero(scene, views, None), "figure", tmp_path, request)
+    hero = Hero(scene, views, None).symmetric()
+    done = write_mesh(hero, "figure", tmp_path, MeshOptions(resolution=32, faces=400, smooth=3))
+    lines = write_convergence(hero, "figure", tmp_path, done.built)
     text = (tmp_path / "figure_cameras.md").read_text()
     assert "| density | distance, mm | IoU |" in text and "one evaluation is exact" in text
-    assert any("one evaluation is exact" in one for one in done.said)
+    assert any("one evaluation is exact" in one for one in lines)
     assert done.meshes[0].is_file()

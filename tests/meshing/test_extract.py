@@ -13,6 +13,7 @@ from charnerf.meshing.build import build_mesh
 from charnerf.meshing.calibrate import LEVELS, choose_level
 from charnerf.meshing.density_grid import DensityGrid, GridSampler
 from charnerf.meshing.extract import drop_floaters, extract_surface, fit_height, simplify
+from charnerf.meshing.options import MeshOptions
 from charnerf.types import LeftOut, SourceViews
 from support.analytic_scenes import capsule, figure, scene_of, sphere
 
@@ -65,7 +66,7 @@ def test_empty_field_says_its_range():
     with pytest.raises(NumericalError, match=r"found densities from 0.25 to 0.25 1/m.*above the level 15"):
         extract_surface(grid, 15.0)
     with pytest.raises(NumericalError, match=r"found densities from 0 to 0.*no ray loses half"):
-        build_mesh(scene_of(sphere, peak=0.0), None, resolution=32)
+        build_mesh(scene_of(sphere, peak=0.0), None, MeshOptions(resolution=32))
     with pytest.raises(DataError, match="level: found -1"):
         extract_surface(grid, -1.0)
 
@@ -142,7 +143,7 @@ def test_level_of_a_slab_is_the_density_where_half_of_the_light_is_gone():
 
 
 def test_built_mesh_is_coloured_and_of_the_asked_size():
-    built = build_mesh(scene_of(figure), _views_of(figure), resolution=96, faces=4000, height=2.0)
+    built = build_mesh(scene_of(figure), _views_of(figure), MeshOptions(resolution=96, faces=4000))
     mesh = built.mesh
     assert 3900 <= len(mesh.faces) <= 4000 < built.num_extracted
     assert mesh.bounds[0, 2] == 0.0 and mesh.extents[2] == pytest.approx(2.0, abs=1e-9)
@@ -156,5 +157,5 @@ def test_a_sword_held_loosely_survives():
     def armed(points):
         return torch.maximum(figure(points), capsule(points, (1.0, 0, 0.9), (1.0, 0, 1.9), 0.05))
 
-    built = build_mesh(scene_of(armed, width=0.02), None, resolution=96)
+    built = build_mesh(scene_of(armed, width=0.02), None, MeshOptions(resolution=96, height=None))
     assert len(built.mesh.split()) == 2 and built.num_floaters == 0

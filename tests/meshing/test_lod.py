@@ -9,6 +9,7 @@ import trimesh
 from charnerf.errors import DataError
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.lod import build_lods, lod_report, lod_table, named, num_parts
+from charnerf.meshing.options import MeshOptions
 from support.analytic_scenes import scene_of, sphere
 
 
@@ -34,9 +35,8 @@ def test_parts_are_counted():
 
 @pytest.fixture(scope="module")
 def lods():
-    return build_lods(
-        scene_of(sphere, width=0.1), None, resolutions=(32, 48), faces=(500, 1500), num_cameras=1, height=2.0
-    )
+    options = MeshOptions(num_cameras=1)
+    return build_lods(scene_of(sphere, width=0.1), None, options, resolutions=(32, 48), faces=(500, 1500))
 
 
 def test_levels_of_a_sphere_have_the_figures_of_a_sphere(lods):
@@ -68,10 +68,10 @@ def test_the_table_names_files_and_the_papers_values(lods):
     assert len(table.splitlines()) == 2 + 4
     assert len({line.count("|") for line in table.splitlines()}) == 1
     scene = scene_of(sphere, width=0.1)
-    grid = build_lods(scene, None, resolutions=(64,), num_cameras=1)
+    grid = build_lods(scene, None, MeshOptions(num_cameras=1), resolutions=(64,))
     assert "| 1822, 3640, 2 |" in lod_report(named(grid, "ball"))
 
 
 def test_no_grid_is_an_error():
     with pytest.raises(DataError, match="found no grid"):
-        build_lods(scene_of(sphere), None, resolutions=())
+        build_lods(scene_of(sphere), None, MeshOptions(), resolutions=())

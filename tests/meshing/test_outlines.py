@@ -9,6 +9,7 @@ import torch
 
 from charnerf.meshing.build import build_mesh
 from charnerf.meshing.density_grid import GridSampler
+from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import ABOVE, gain_at, raised_rays
 from charnerf.surfaces.render import render_mesh
 from charnerf.types import FieldOutput, Scene, SourceViews
@@ -38,7 +39,7 @@ def scene(hazy: float | None = None) -> Scene:
 def drawings() -> SourceViews:
     """The whole figure as front, side and back drawing, from its own mesh."""
     cameras = helpers.source_cameras(size=128)
-    mesh = build_mesh(scene(), None, resolution=96, level=LEVEL).mesh
+    mesh = build_mesh(scene(), None, MeshOptions(resolution=96, height=None), level=LEVEL).mesh
     pictures = torch.from_numpy(render_mesh(mesh, cameras)).movedim(-1, 1)[None].float()
     flags = torch.zeros(1, len(pictures[0]), dtype=torch.bool)
     return SourceViews(images=pictures, cameras=cameras[None], present=~flags, mirrored=flags)
@@ -53,8 +54,8 @@ def covered(mesh, drawings: SourceViews) -> float:
 
 def test_a_hazy_arm_is_part_of_the_mesh_and_lies_where_it_is_densest(drawings):
     hazy = scene(hazy=6.0)
-    without = build_mesh(hazy, None, resolution=96, level=LEVEL)
-    built = build_mesh(hazy, drawings, resolution=96, level=LEVEL)
+    without = build_mesh(hazy, None, MeshOptions(resolution=96, height=None), level=LEVEL)
+    built = build_mesh(hazy, drawings, MeshOptions(resolution=96, height=None), level=LEVEL)
     assert covered(without.mesh, drawings) < 0.92
     assert covered(built.mesh, drawings) > 0.96
     assert 0.04 < built.missed < 0.2 and without.missed == 0.0
@@ -94,8 +95,8 @@ def test_only_missed_rays_are_raised_to_just_above_the_level(drawings):
 def test_a_surface_that_covers_its_drawings_stays_as_it_is(drawings):
     """But for the rim, where a pixel's middle may pass the surface by a hair."""
     whole = scene()
-    with_drawings = build_mesh(whole, drawings, resolution=64, level=LEVEL)
-    without = build_mesh(whole, None, resolution=64, level=LEVEL)
+    with_drawings = build_mesh(whole, drawings, MeshOptions(resolution=64, height=None), level=LEVEL)
+    without = build_mesh(whole, None, MeshOptions(resolution=64, height=None), level=LEVEL)
     assert with_drawings.missed < 0.03
     assert abs(with_drawings.mesh.volume / without.mesh.volume - 1.0) < 0.02
 
@@ -103,7 +104,7 @@ def test_a_surface_that_covers_its_drawings_stays_as_it_is(drawings):
 def test_what_the_field_does_not_know_of_is_not_made_up(drawings):
     """A drawing of two arms over a field with one: where there is no density, none is multiplied into a surface."""
     empty = scene(hazy=0.0)
-    built = build_mesh(empty, drawings, resolution=64, level=LEVEL)
+    built = build_mesh(empty, drawings, MeshOptions(resolution=64, height=None), level=LEVEL)
     assert built.mesh.bounds[1, 0] < 0.45
     nothing = replace(drawings, images=torch.zeros_like(drawings.images))
-    assert build_mesh(empty, nothing, resolution=64, level=LEVEL).missed == 0.0
+    assert build_mesh(empty, nothing, MeshOptions(resolution=64, height=None), level=LEVEL).missed == 0.0

@@ -14,7 +14,7 @@ from charnerf.meshing.atlas import rasterise, unwrap
 from charnerf.meshing.extract import fit_height
 from charnerf.meshing.parts import parts_of, read_texture, texture_picture, welded
 from charnerf.meshing.projection import Projector
-from charnerf.meshing.texture import Texturing, padded_picture, texture_mesh
+from charnerf.meshing.texture import padded_picture, texture_mesh
 from charnerf.types import SourceViews
 from support.analytic_scenes import scene_of, sphere
 
@@ -92,7 +92,7 @@ def test_an_atlas_keeps_triangles_apart_and_in_order(monkeypatch):
 
 def test_texturing_moves_no_surface_and_no_normal():
     mesh = _ball()
-    done = texture_mesh(_grey_scene(), mesh, Texturing("drawings", 128, _views(_plain)))
+    done = texture_mesh(_grey_scene(), mesh, _views(_plain), size=128)
     joined = welded(parts_of(fit_height(done.mesh, 1.6), ".ply", "x"))
     back = trimesh.Trimesh(joined.vertices, joined.faces, process=False)
     assert back.is_watertight and back.euler_number == 2
@@ -104,7 +104,7 @@ def test_texturing_moves_no_surface_and_no_normal():
 
 
 def test_each_side_has_the_colour_that_was_drawn_and_the_field_the_rest():
-    done = texture_mesh(_grey_scene(), _ball(), Texturing("drawings", 256, _views(_plain)))
+    done = texture_mesh(_grey_scene(), _ball(), _views(_plain), size=256)
     found = _colour_at(done.mesh, [(0, -1, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0)])
     np.testing.assert_allclose(found[:3], (FRONT, SIDE, BACK), atol=0.02)
     np.testing.assert_allclose(found[3], 0.5, atol=0.06)  # the right side nobody drew
@@ -170,7 +170,7 @@ def test_views_of_unequal_brightness_meet_without_a_step():
 
 def test_the_field_paints_everything_when_asked():
     scene = scene_of(sphere)
-    done = texture_mesh(scene, _ball(), Texturing("field", 128, _views(_plain)))
+    done = texture_mesh(scene, _ball(), None, size=128)
     assert done.num_from_field == done.num_texels
     place = np.asarray(done.mesh.vertices, np.float32)
     wanted = scene.field(torch.from_numpy(place), torch.zeros(len(place), 3)).rgb.numpy()

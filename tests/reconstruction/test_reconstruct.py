@@ -16,8 +16,10 @@ from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.hull import build_hull
 from charnerf.inference.hero import Hero
+from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.parts import read_texture
-from charnerf.reconstruction import reconstruct
+from charnerf.reconstruction.folder import reconstruct
+from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.types import FieldOutput, Scene
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -68,11 +70,12 @@ def drawings(tmp_path) -> dict[str, Path]:
     return paths
 
 
-OPTIONS = {"resolution": 32, "faces": 600, "frames": 6, "size": 48, "num_cameras": 2, "texture_size": 128}
+MESH = MeshOptions(resolution=32, faces=600, num_cameras=2, texture="drawings", texture_size=128)
+OPTIONS = ReconstructionOptions(mesh=MESH, frames=6, size=48)
 
 
 def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
-    done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **drawings)
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert names == ["drawings.png", "mesh.glb", "meshes", "report.md", done.turntable.name, "views"]
     assert Image.open(tmp_path / "out" / "meshes" / "mesh_sheet.png").width > 1000
@@ -90,19 +93,20 @@ def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
 
 def test_the_mesh_wears_the_drawings(tmp_path, drawings):
     """The field is red in front and green behind; the side drawing is orange, which the field never is."""
-    done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **drawings)
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
     uv = np.asarray(mesh.visual.uv)
     colours = read_texture(mesh.visual.material.baseColorTexture, uv)
     left = mesh.vertices[:, 0] > 0.45  # Y up: x stays the character's left
     assert left.any()
     np.testing.assert_allclose(np.median(colours[left], axis=0), (1.0, 165 / 255, 0.0), atol=0.02)
-    plain = reconstruct(FakeModel(), **drawings, output=tmp_path / "plain", **OPTIONS, texture="vertex")
+    in_vertices = replace(OPTIONS, mesh=replace(MESH, texture="vertex"))
+    plain = reconstruct(FakeModel(), tmp_path / "plain", in_vertices, **drawings)
     assert trimesh.load(plain.mesh, force="mesh").visual.material.baseColorTexture is None
 
 
 def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
-    done = reconstruct(FakeModel(), **drawings, output=tmp_path / "out", **OPTIONS)
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **drawings)
     text = done.report.read_text()
     for words in (
         "floor line",
@@ -125,7 +129,7 @@ def test_a_second_run_replaces_its_pieces_and_nothing_else(tmp_path, drawings):
     (output / "turntable.gif").write_text("old")
     (output / "views").mkdir()
     (output / "views" / "007.png").write_text("old")
-    reconstruct(FakeModel(), **drawings, output=output, **OPTIONS)
+    reconstruct(FakeModel(), output, OPTIONS, **drawings)
     assert (output / "notes.txt").read_text() == "mine"
     assert not (output / "views" / "007.png").exists()
     assert len(list(output.glob("turntable.*"))) == 1
@@ -134,15 +138,13 @@ def test_a_second_run_replaces_its_pieces_and_nothing_else(tmp_path, drawings):
 
 def test_nothing_is_left_of_a_failure(tmp_path, drawings):
     with pytest.raises(NumericalError, match="The field is empty"):
-        reconstruct(FakeModel(density=0.0), **drawings, output=tmp_path / "out", **OPTIONS)
+        reconstruct(FakeModel(density=0.0), tmp_path / "out", OPTIONS, **drawings)
     with pytest.raises(DataError, match=r"gone\.png"):
-        reconstruct(
-            FakeModel(), **{**drawings, "side": tmp_path / "gone.png"}, output=tmp_path / "out", **OPTIONS
-        )
+        reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **{**drawings, "side": tmp_path / "gone.png"})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["back.png", "front.png", "side.png"]
     (tmp_path / "file").write_text("")
     with pytest.raises(DataError, match="found a file, expected a folder"):
-        reconstruct(FakeModel(), **drawings, output=tmp_path / "file", **OPTIONS)
+        reconstruct(FakeModel(), tmp_path / "file", OPTIONS, **drawings)
 
 
 def test_without_an_encoder_the_turntable_is_a_gif(tmp_path, monkeypatch):

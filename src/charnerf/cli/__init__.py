@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import typer
 
 from charnerf.cli import drawings as cli_drawings
-from charnerf.cli import meshes as cli_meshes
+from charnerf.cli import mesh, reconstruct
 from charnerf.cli.card import card
 from charnerf.cli.finetune import finetune
 from charnerf.cli.options import (
@@ -204,8 +204,8 @@ def evaluate(
 app.command(epilog=DEBUG_NOTE)(card)
 app.command(epilog=DEBUG_NOTE)(cli_drawings.draw)
 app.command(epilog=DEBUG_NOTE)(cli_drawings.gallery)
-app.command(epilog=DEBUG_NOTE)(cli_meshes.mesh)
-app.command(epilog=DEBUG_NOTE)(cli_meshes.reconstruct)
+app.command("mesh", epilog=DEBUG_NOTE)(mesh.command)
+app.command("reconstruct", epilog=DEBUG_NOTE)(reconstruct.command)
 app.command(epilog=DEBUG_NOTE)(finetune)
 
 

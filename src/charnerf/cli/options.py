@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from charnerf.meshing.options import Texture
+
 Weights = Annotated[
     Path | None,
     typer.Argument(
@@ -60,3 +62,38 @@ Sources = Annotated[
     Literal["orthographic", "pinhole"], typer.Option(help="Projection of the front, side and back views.")
 ]
 Depth = Annotated[bool, typer.Option("--depth", help="Write depth pictures too (16 bit, mm).")]
+Front = Annotated[
+    Path, typer.Argument(metavar="FRONT", exists=True, dir_okay=False, help="Front view, an image.")
+]
+Side = Annotated[Path, typer.Argument(metavar="SIDE", exists=True, dir_okay=False, help="Side view.")]
+Back = Annotated[Path, typer.Argument(metavar="BACK", exists=True, dir_okay=False, help="Back view.")]
+SideShows = Annotated[
+    Literal["left", "right"],
+    typer.Option(
+        "--side",
+        help="Which side of the character SIDE shows; left: its face looks to the picture's left.",
+    ),
+]
+Cameras = Annotated[int, typer.Option(help="Cameras whose directions the density is averaged over.")]
+Height = Annotated[
+    float | None, typer.Option(metavar="M", help="Exact height of the mesh, m; its lowest point is at 0.")
+]
+Resolution = Annotated[int, typer.Option(max=1024, help="Grid points along the mesh's longest side.")]
+Smooth = Annotated[
+    int, typer.Option(metavar="N", help="Rounds of smoothing of the surface; it does not shrink.")
+]
+Symmetric = Annotated[
+    bool,
+    typer.Option(
+        "--symmetric", help="Average densities over left and right: for characters that are symmetric."
+    ),
+]
+Colors = Annotated[
+    Texture,
+    typer.Option(
+        "--texture",
+        help="Colours: at vertices, by the field; a texture from the drawings, by the field where none sees the surface;"
+        " or a texture by the field.",
+    ),
+]
+TextureSize = Annotated[int, typer.Option(help="Texels a side of the texture.")]

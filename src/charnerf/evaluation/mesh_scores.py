@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,19 +15,18 @@ from charnerf.evaluation.baselines import VisualHullBaseline
 from charnerf.evaluation.surface_error import surface_scores, true_points
 from charnerf.markdown import table
 from charnerf.meshing.build import find_surface, finish_mesh
-from charnerf.meshing.texture import Texturing
+from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.pictures import on_white
 from charnerf.surfaces.render import render_mesh
 from charnerf.types import Cameras, Scene
 
-KINDS = ("drawings", "field", "vertex")
+KINDS: tuple[Texture, ...] = ("drawings", "field", "vertex")
 WHOLE = 0.99  # alpha from which a pixel shows the character alone
 NOVEL_VIEWS = 12  # at most, evenly chosen
 
 
-def score_meshes(
-    scene: Scene, character: Character, *, resolution: int, faces: int, num_cameras: int, texture_size: int
-) -> dict[str, Any]:
+@torch.no_grad()
+def score_meshes(scene: Scene, character: Character, options: MeshOptions) -> dict[str, Any]:
     """Figures of one character's mesh with each kind of colours, and of the visual hull's mesh.
 
     Texture PSNR is over pixels that both the captured character and the mesh cover wholly: what the colours
@@ -39,12 +38,11 @@ def score_meshes(
         "source": (sources.cameras[0].to("cpu"), sources.images[0].cpu().movedim(1, -1).numpy()),
         "novel": (character.cameras[indices], character.images(indices).numpy() / 255.0),
     }
-    found = find_surface(scene, sources, resolution=resolution, num_cameras=num_cameras)
+    found = find_surface(scene, sources, options)
     result: dict[str, Any] = {"surface_seconds": found.seconds, "level": found.extraction.level}
     for kind in KINDS:
         start = time.perf_counter()
-        how = None if kind == "vertex" else Texturing(kind, texture_size, sources)  # type: ignore[arg-type]
-        built = finish_mesh(scene, found, faces=faces, texturing=how)
+        built = finish_mesh(scene, found, sources, replace(options, texture=kind, height=None))
         result[f"{kind}_seconds"] = time.perf_counter() - start
         if built.textured is not None and kind == "drawings":
             result["texels_from_field"] = built.textured.num_from_field / max(built.textured.num_texels, 1)
@@ -128,29 +126,3 @@ def mean_of(rows: Any, key: str) -> float | None:
     """Mean of a figure over the rows that have it."""
     values = [row[key] for row in rows if row.get(key) is not None]
     return float(np.mean(values)) if values else None
-
-
-@torch.no_grad()
-def score_split(
-    scene_of: Callable[[Character], Scene],
-    characters: Sequence[Character],
-    *,
-    resolution: int,
-    faces: int,
-    num_cameras: int,
-    texture_size: int,
-    on_done: Callable[[str], object] = lambda name: None,
-) -> dict[str, dict[str, Any]]:
-    """Figures by name of several characters; arguments as of `score_meshes`."""
-    rows = {}
-    for character in characters:
-        rows[character.name] = score_meshes(
-            scene_of(character),
-            character,
-            resolution=resolution,
-            faces=faces,
-            num_cameras=num_cameras,
-            texture_size=texture_size,
-        )
-        on_done(character.name)
-    return rows

@@ -5,25 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 import torch
 
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.errors import ConfigError
-from charnerf.geometry.framing import CENTRE, HEIGHT, framing_camera, framing_radius
+from charnerf.geometry.framing import CENTRE, framing_camera, framing_radius
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.lod import Lod, build_lods
+from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.meshing.symmetry import symmetric_scene
-from charnerf.meshing.texture import TEXTURE_SIZE, Texturing
 from charnerf.types import Cameras, Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 if TYPE_CHECKING:
     import trimesh
-
-TextureKind = Literal["drawings", "field", "vertex"]
 
 
 @final
@@ -74,62 +72,36 @@ class Hero:
     def mesh(
         self,
         *,
-        resolution: int = 256,
-        num_cameras: int = 8,
-        faces: int | None = None,
-        smooth: int = 0,
-        height: float = HEIGHT,
-        texture: TextureKind = "vertex",
-        texture_size: int = TEXTURE_SIZE,
+        resolution: int = MeshOptions.resolution,
+        num_cameras: int = MeshOptions.num_cameras,
+        faces: int | None = MeshOptions.faces,
+        smooth: int = MeshOptions.smooth,
+        height: float | None = MeshOptions.height,
+        texture: Texture = MeshOptions.texture,
+        texture_size: int = MeshOptions.texture_size,
     ) -> trimesh.Trimesh:
-        """Make a coloured mesh: world frame, metres, on z = 0; write it with `charnerf.save_mesh`.
+        """Make a colored mesh: world frame, metres, on z = 0; write it with `charnerf.save_mesh`.
 
-        Args:
-            resolution: Grid points along the longest side.
-            num_cameras: Cameras whose directions the density is averaged over (one where the density sees no
-                direction).
-            faces: Faces after decimation; None keeps all. A texture takes a second for 4000 faces.
-            smooth: Rounds of smoothing; it does not shrink.
-            height: Its exact height, m.
-            texture: vertex: colours at vertices, by the field. drawings: a base-colour texture from the
-                drawings, by the field where none sees the surface. field: a texture by the field alone.
-            texture_size: Texels a side.
+        Args are those of `charnerf.meshing.options.MeshOptions`.
         """
         return self.build_mesh(
-            resolution=resolution,
-            num_cameras=num_cameras,
-            faces=faces,
-            smooth=smooth,
-            height=height,
-            texture=texture,
-            texture_size=texture_size,
-        ).mesh
-
-    def build_mesh(
-        self,
-        *,
-        resolution: int,
-        num_cameras: int,
-        faces: int | None,
-        smooth: int = 0,
-        height: float = HEIGHT,
-        texture: TextureKind = "vertex",
-        texture_size: int = TEXTURE_SIZE,
-        on_points: Callable[[int], object] = lambda count: None,
-    ) -> BuiltMesh:
-        """As `mesh`, with how it came about: level, parts dropped, work left out, seconds."""
-        with torch.no_grad():
-            return build_mesh(
-                self.scene,
-                self.views,
+            MeshOptions(
                 resolution=resolution,
                 num_cameras=num_cameras,
                 faces=faces,
                 smooth=smooth,
                 height=height,
-                texturing=self.texturing(texture, texture_size),
-                on_points=on_points,
+                texture=texture,
+                texture_size=texture_size,
             )
+        ).mesh
+
+    def build_mesh(
+        self, options: MeshOptions, *, on_points: Callable[[int], object] = lambda count: None
+    ) -> BuiltMesh:
+        """As `mesh`, with how it came about: level, parts dropped, work left out, seconds."""
+        with torch.no_grad():
+            return build_mesh(self.scene, self.views, options, detailed=self.detailed, on_points=on_points)
 
     def symmetric(self) -> Hero:
         """The character as its own mirror image: densities averaged over left and right, for meshes and views."""
@@ -137,28 +109,18 @@ class Hero:
 
     def lods(
         self,
+        options: MeshOptions | None = None,
         *,
         resolutions: Sequence[int],
         faces: Sequence[int] = (),
-        num_cameras: int = 8,
-        smooth: int = 0,
-        height: float = HEIGHT,
-        texture: TextureKind = "vertex",
-        texture_size: int = TEXTURE_SIZE,
-        decimated_only: bool = False,
         on_points: Callable[[int], object] = lambda count: None,
     ) -> tuple[Lod, ...]:
         """Make levels of detail, the finest first: one mesh a grid, and one a number of faces.
 
         Args:
+            options: How each is made, grid and faces aside; the defaults if None.
             resolutions: Grids, points along the longest side.
             faces: Faces to decimate the finest grid's surface to.
-            num_cameras: As of `mesh`, as are the next four.
-            smooth: Rounds of smoothing of each grid's surface.
-            height: Exact height of each, m.
-            texture: Their colours.
-            texture_size: Texels a side.
-            decimated_only: Leave the grids' own meshes out.
             on_points: Called with the number of grid points after each piece of work.
 
         Returns:
@@ -168,24 +130,12 @@ class Hero:
             return build_lods(
                 self.scene,
                 self.views,
+                options or MeshOptions(),
                 resolutions=resolutions,
                 faces=faces,
-                num_cameras=num_cameras,
-                smooth=smooth,
-                height=height,
-                texturing=self.texturing(texture, texture_size),
-                decimated_only=decimated_only,
+                detailed=self.detailed,
                 on_points=on_points,
             )
-
-    def texturing(self, texture: TextureKind, size: int = TEXTURE_SIZE) -> Texturing | None:
-        """How a mesh of this character is textured; None for vertex colours."""
-        if texture == "vertex":
-            return None
-        if texture not in ("drawings", "field"):
-            raise ConfigError(f"texture: found '{texture}', expected drawings, field or vertex.")
-        views = self.views if self.detailed is None else self.detailed
-        return Texturing(colours=texture, size=size, views=views)
 
     def radius(self) -> float:
         """Radius around (0, 0, 1) that pictures frame, m: of the hull with a margin, at least 1.05 m."""

@@ -13,9 +13,10 @@ from charnerf.meshing.calibrate import LevelChoice, choose_level
 from charnerf.meshing.colour import colour_vertices
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
+from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import gain_at, raised_rays
 from charnerf.meshing.smooth import smooth_mesh
-from charnerf.meshing.texture import Textured, Texturing, texture_mesh
+from charnerf.meshing.texture import Textured, texture_mesh
 from charnerf.types import LeftOut, Scene, SourceViews
 
 
@@ -72,14 +73,10 @@ class BuiltMesh:
 def build_mesh(
     scene: Scene,
     views: SourceViews | None,
+    options: MeshOptions,
     *,
-    resolution: int = 128,
-    num_cameras: int = 8,
-    faces: int | None = None,
+    detailed: SourceViews | None = None,
     level: float | None = None,
-    smooth: int = 0,
-    height: float | None = None,
-    texturing: Texturing | None = None,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> BuiltMesh:
     """Make a mesh of a character's field.
@@ -87,47 +84,34 @@ def build_mesh(
     Args:
         scene: One character's field.
         views: Its drawings (B = 1): densities are raised where the surface would miss their silhouettes; None has none.
-        resolution: Grid points along the longest side of the hull.
-        num_cameras: Cameras whose directions the density is averaged over.
-        faces: Faces after decimation; None keeps all.
+        options: How it is made.
+        detailed: The drawings with more pixels, for a texture; `views` themselves if None.
         level: Density of the surface, 1/m; None chooses it by rendered depths.
-        smooth: Rounds of smoothing, before decimation; it does not shrink.
-        height: Height to scale to, m, with the lowest point on z = 0; None leaves size and place as the
-            field has them.
-        texturing: How to texture it; None gives vertex colours.
         on_points: Called with the number of grid points after each piece of work.
 
     Raises:
-        DataError: If an argument is out of range or the hull empty.
+        DataError: If the level is not positive, the hull empty, or there are too many faces for a texture.
         NumericalError: If the field is empty or not finite.
     """
-    found = find_surface(
-        scene,
-        views,
-        resolution=resolution,
-        num_cameras=num_cameras,
-        level=level,
-        smooth=smooth,
-        on_points=on_points,
-    )
-    return finish_mesh(scene, found, faces=faces, height=height, texturing=texturing)
+    found = find_surface(scene, views, options, level=level, on_points=on_points)
+    return finish_mesh(scene, found, views if detailed is None else detailed, options)
 
 
 def find_surface(
     scene: Scene,
     views: SourceViews | None,
+    options: MeshOptions,
     *,
-    resolution: int,
-    num_cameras: int,
     level: float | None = None,
-    smooth: int = 0,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> FoundSurface:
     """The surface of a field, all of its faces; arguments and errors as of `build_mesh`."""
     start = time.perf_counter()
-    sampler = GridSampler(scene, resolution=resolution, num_cameras=num_cameras, on_points=on_points)
+    sampler = GridSampler(
+        scene, resolution=options.resolution, num_cameras=options.num_cameras, on_points=on_points
+    )
     choice, raised = None, []
-    coarse = sampler.evaluate_coarse(2 if resolution < 192 else 4)
+    coarse = sampler.evaluate_coarse(2 if options.resolution < 192 else 4)
     if level is None:
         choice = choose_level(coarse, views)
         level = choice.chosen.level
@@ -137,30 +121,26 @@ def find_surface(
             sampler.multiply(partial(gain_at, raised))
     grid = sampler.evaluate_surface(level)
     extraction = extract_surface(grid, level, density_at=sampler.density_at)
-    extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, smooth))
+    extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, options.smooth))
     missed = sum(one.num_missed for one in raised) / max(1, sum(one.num_pixels for one in raised))
     return FoundSurface(extraction, choice, missed, grid.left_out, time.perf_counter() - start)
 
 
 def finish_mesh(
-    scene: Scene,
-    found: FoundSurface,
-    *,
-    faces: int | None = None,
-    height: float | None = None,
-    texturing: Texturing | None = None,
+    scene: Scene, found: FoundSurface, drawings: SourceViews | None, options: MeshOptions
 ) -> BuiltMesh:
-    """Decimate, colour and scale a surface that was found; arguments and errors as of `build_mesh`."""
+    """Decimate, color and scale a surface that was found; errors as of `build_mesh`."""
     start = time.perf_counter()
     extraction, textured = found.extraction, None
-    surface = extraction.mesh if faces is None else simplify(extraction.mesh, faces)
-    if texturing is None:
+    surface = extraction.mesh if options.faces is None else simplify(extraction.mesh, options.faces)
+    if options.texture == "vertex":
         surface = mesh = colour_vertices(scene, surface)
     else:
-        textured = texture_mesh(scene, surface, texturing)
+        used = drawings if options.texture == "drawings" else None
+        textured = texture_mesh(scene, surface, used, size=options.texture_size)
         mesh = textured.mesh
-    if height is not None:
-        mesh, surface = fit_height(mesh, height), fit_height(surface, height)
+    if options.height is not None:
+        mesh, surface = fit_height(mesh, options.height), fit_height(surface, options.height)
     return BuiltMesh(
         mesh=mesh,
         surface=surface,

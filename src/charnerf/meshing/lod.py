@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from charnerf.errors import DataError
 from charnerf.markdown import table
 from charnerf.meshing.build import BuiltMesh, find_surface, finish_mesh
 from charnerf.meshing.distance import surface_chamfer_mm
-from charnerf.meshing.texture import Texturing
+from charnerf.meshing.options import MeshOptions
 from charnerf.types import Scene, SourceViews
 
 PAPER = {64: (1822, 3640), 128: (7646, 15288), 256: (49582, 98972)}
@@ -28,16 +28,14 @@ class Lod:
     """One level of detail.
 
     Attributes:
-        resolution: Grid points along the longest side.
-        asked: Faces asked for; None where none were decimated.
+        options: How it was made.
         built: The mesh.
         chamfer_mm: Distance of its surface from the finest level's, mm.
         seconds: Time it took, from what was there before: the field for grids, the finest grid's surface for
             decimated meshes.
     """
 
-    resolution: int
-    asked: int | None
+    options: MeshOptions
     built: BuiltMesh
     chamfer_mm: float
     seconds: float
@@ -48,15 +46,15 @@ class Lod:
         counts = self.built.left_out
         evaluated = 1.0 - counts.grid_cells / max(counts.grid_cells_of, 1)
         return {
-            "grid": self.resolution,
-            "faces_asked": self.asked,
+            "grid": self.options.resolution,
+            "faces_asked": self.options.faces,
             "vertices": len(surface.vertices),
             "faces": len(surface.faces),
             "parts": num_parts(surface),
             "watertight": bool(surface.is_watertight),
             "euler_number": int(surface.euler_number),
             "chamfer_mm": self.chamfer_mm,
-            "evaluated": evaluated if self.asked is None else None,
+            "evaluated": evaluated if self.options.faces is None else None,
             "seconds": self.seconds,
         }
 
@@ -64,14 +62,11 @@ class Lod:
 def build_lods(
     scene: Scene,
     views: SourceViews | None,
+    options: MeshOptions,
     *,
     resolutions: Sequence[int],
     faces: Sequence[int] = (),
-    num_cameras: int = 8,
-    smooth: int = 0,
-    height: float | None = None,
-    texturing: Texturing | None = None,
-    decimated_only: bool = False,
+    detailed: SourceViews | None = None,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> tuple[Lod, ...]:
     """Make meshes of one field at several levels of detail, all of one density level.
@@ -79,52 +74,41 @@ def build_lods(
     Args:
         scene: One character's field.
         views: Its drawings (B = 1).
-        resolutions: Grids, points along the longest side; at least one.
+        options: How each is made, grid and faces aside.
+        resolutions: Grids, points along the longest side, whose surfaces keep all their faces; at least one.
         faces: Faces to decimate the finest grid's surface to.
-        num_cameras: Cameras whose directions the density is averaged over.
-        smooth: Rounds of smoothing of each grid's surface.
-        height: Height to scale each to, m; None leaves size and place as the field has them.
-        texturing: How to texture each; None gives vertex colours.
-        decimated_only: Leave the grids' own meshes out.
+        detailed: The drawings with more pixels, for textures; `views` themselves if None.
         on_points: Called with the number of grid points after each piece of work.
 
     Returns:
         The levels, most faces first; distances are to the first.
 
     Raises:
-        DataError: If an argument is out of range, there is no grid, or the hull is empty.
+        ConfigError: If a grid or a number of faces is out of range.
+        DataError: If there is no grid, or the hull is empty.
         NumericalError: If the field is empty or not finite.
     """
     if not resolutions:
         raise DataError("lod: found no grid, expected at least one, such as 128.")
-    made: list[tuple[int, int | None, BuiltMesh, float]] = []
+    drawings = views if detailed is None else detailed
+    grids = [replace(options, resolution=one, faces=None) for one in sorted(set(resolutions), reverse=True)]
+    decimated = [replace(grids[0], faces=count) for count in sorted(set(faces), reverse=True)]
+    made: list[tuple[MeshOptions, BuiltMesh, float]] = []
     level, finest = None, None
-    for resolution in sorted(set(resolutions), reverse=True):
+    for grid in grids:
         start = time.perf_counter()
-        found = find_surface(
-            scene,
-            views,
-            resolution=resolution,
-            num_cameras=num_cameras,
-            level=level,
-            smooth=smooth,
-            on_points=on_points,
-        )
+        found = find_surface(scene, views, grid, level=level, on_points=on_points)
         level, finest = found.extraction.level, finest or found
-        if not decimated_only:
-            built = finish_mesh(scene, found, height=height, texturing=texturing)
-            made.append((resolution, None, built, time.perf_counter() - start))
-    assert finest is not None
-    for count in sorted(set(faces), reverse=True):
+        built = finish_mesh(scene, found, drawings, grid)
+        made.append((grid, built, time.perf_counter() - start))
+    assert finest is not None  # there is a grid
+    for one in decimated:
         start = time.perf_counter()
-        built = finish_mesh(scene, finest, faces=count, height=height, texturing=texturing)
-        made.append((max(resolutions), count, built, time.perf_counter() - start))
-    made.sort(key=lambda one: len(one[2].surface.faces), reverse=True)
-    first = made[0][2].surface
-    return tuple(
-        Lod(resolution, asked, built, _distance(built.surface, first), seconds)
-        for resolution, asked, built, seconds in made
-    )
+        built = finish_mesh(scene, finest, drawings, one)
+        made.append((one, built, time.perf_counter() - start))
+    made.sort(key=lambda each: len(each[1].surface.faces), reverse=True)
+    first = made[0][1].surface
+    return tuple(Lod(one, built, _distance(built.surface, first), seconds) for one, built, seconds in made)
 
 
 def _distance(mesh: trimesh.Trimesh, finest: trimesh.Trimesh) -> float:
@@ -147,7 +131,7 @@ def lod_table(files: dict[str, Lod]) -> str:
         cells += ["yes" if row["watertight"] else "no", f"{row['euler_number']}", f"{row['chamfer_mm']:.2f}"]
         share = row["evaluated"]
         cells += ["-" if share is None else f"{100 * share:.1f} %", f"{row['seconds']:.1f}"]
-        paper = PAPER.get(lod.resolution) if lod.asked is None else None
+        paper = PAPER.get(lod.options.resolution) if lod.options.faces is None else None
         cells.append("-" if paper is None else f"{paper[0]}, {paper[1]}, {paper[0] - paper[1] // 2}")
         rows.append(cells)
     return "\n".join(table(heads, rows))

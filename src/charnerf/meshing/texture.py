@@ -6,7 +6,6 @@ Letters: K texels that show surface, P vertices, S texels a side.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import trimesh
@@ -23,23 +22,6 @@ from charnerf.types import Scene, SourceViews
 ENOUGH = 0.1  # trust from which the drawings decide alone
 FADE = 0.08  # metres over which the field's colours are matched to the drawings' beside them
 MATERIAL = "character"
-TEXTURE_SIZE = 1024
-
-
-@dataclass(frozen=True)
-class Texturing:
-    """How a mesh is to be textured.
-
-    Attributes:
-        colours: Where a texel's colour comes from: the drawings, with the field where none sees it; or the
-            field alone.
-        size: S.
-        views: The drawings, B = 1, of any resolution.
-    """
-
-    colours: Literal["drawings", "field"]
-    size: int
-    views: SourceViews
 
 
 @dataclass(frozen=True)
@@ -59,28 +41,29 @@ class Textured:
     num_from_field: int
 
 
-def texture_mesh(scene: Scene, mesh: trimesh.Trimesh, texturing: Texturing) -> Textured:
+def texture_mesh(scene: Scene, mesh: trimesh.Trimesh, drawings: SourceViews | None, *, size: int) -> Textured:
     """Give a mesh a base-colour texture; neither its surface nor its normals change.
 
     Args:
         scene: One character's field.
         mesh: Its surface, in the field's frame, normals outward.
-        texturing: Colours, size, drawings.
+        drawings: B = 1, of any resolution: a texel has their color, or the field's where none sees it; None: the field's.
+        size: S.
 
     Raises:
         DataError: If the size is out of range or there are too many faces to unwrap.
         NumericalError: If the field answers NaN or infinity.
     """
-    atlas = unwrap(mesh, texturing.size)
-    texels = rasterise(atlas, texturing.size)
+    atlas = unwrap(mesh, size)
+    texels = rasterise(atlas, size)
     points, normals = _spread(mesh.vertices, mesh, texels), _spread(mesh.vertex_normals, mesh, texels)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    if texturing.colours == "field":
+    if drawings is None:
         rgb, asked = field_colours(scene, points, normals), len(points)
     else:
-        rgb, asked = _drawn_colours(scene, mesh, texturing.views, points, normals, texels)
-    picture = Image.fromarray(padded_picture(rgb, texels, texturing.size))
-    return Textured(textured_copy(mesh, atlas, picture), texturing.size, len(points), asked)
+        rgb, asked = _drawn_colours(scene, mesh, drawings, points, normals, texels)
+    picture = Image.fromarray(padded_picture(rgb, texels, size))
+    return Textured(textured_copy(mesh, atlas, picture), size, len(points), asked)
 
 
 def _spread(values: np.ndarray, mesh: trimesh.Trimesh, texels: Texels) -> np.ndarray:

@@ -1,9 +1,10 @@
 """Three drawings to a folder: mesh.glb, turntable.mp4, views and report.md."""
 
 import shutil
-import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -12,16 +13,18 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
+from charnerf.drawings.turnaround import Turnaround
 from charnerf.errors import DataError
 from charnerf.finetuning.command import refine
+from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import plot_curve, summary_lines
-from charnerf.geometry.framing import HEIGHT
-from charnerf.inference.hero import TEXTURE_SIZE, TextureKind
+from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
 from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.pictures import bytes_on_white
+from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import mesh_sentences, mesh_words, report_text
 from charnerf.reconstruction.turntable import render_around, write_film
@@ -55,23 +58,14 @@ class Reconstruction:
 
 def reconstruct(
     model: Model,
+    output: Path,
+    options: ReconstructionOptions,
     *,
     front: Path,
     side: Path,
     back: Path,
-    output: Path,
     side_is: Literal["left", "right"] = "left",
-    resolution: int = 128,
-    faces: int = 8000,
-    frames: int = 36,
-    size: int = 160,
-    num_cameras: int = 8,
-    smooth: int = 0,
-    symmetric: bool = False,
-    refine_seconds: float | None = None,
-    height: float = HEIGHT,
-    texture: TextureKind = "drawings",
-    texture_size: int = TEXTURE_SIZE,
+    say: Callable[[str], object] = lambda line: None,
 ) -> Reconstruction:
     """Reconstruct a character from three drawings into a folder.
 
@@ -80,22 +74,13 @@ def reconstruct(
 
     Args:
         model: Loaded, on its device.
+        output: Folder; made if missing.
+        options: What is made.
         front: Front drawing.
         side: Side drawing.
         back: Back drawing.
-        output: Folder; made if missing.
         side_is: Which side of the character the side drawing shows.
-        resolution: Grid points along the mesh's longest side.
-        faces: Faces of the mesh.
-        frames: Frames of the turntable.
-        size: Side of pictures, pixels; 36 of 160 take half a minute on two cores.
-        num_cameras: Cameras whose directions the density is averaged over.
-        smooth: Rounds of smoothing of the mesh.
-        symmetric: Average densities over left and right, for mesh and views.
-        refine_seconds: Time in which the multi-view blocks are adapted to the drawings first; None leaves it.
-        height: Of the mesh, m.
-        texture: Where the mesh's colours come from: drawings, field or vertex.
-        texture_size: Texels a side.
+        say: Gets what was assumed and made, sentence by sentence.
 
     Raises:
         DataError: If a drawing can not be used, or the folder can not be written.
@@ -103,75 +88,100 @@ def reconstruct(
     """
     if output.exists() and not output.is_dir():
         raise DataError(f"{output}: found a file, expected a folder to write to. Choose another.")
-    start = time.perf_counter()
-    hero = model.encode(front=front, side=side, back=back, side_is=side_is)
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "encode"):
+        hero = model.encode(front=front, side=side, back=back, side_is=side_is)
     drawings = hero.turnaround
     assert drawings is not None  # encode made it
     for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
-        sys.stderr.write(f"{line}\n")
-    encoded = time.perf_counter()
-    refined = None if refine_seconds is None else refine(model, hero, refine_seconds)
-    if refined is not None:
+        say(line)
+    refined = None
+    if options.refine_seconds is not None:
+        with _timed(seconds, "refine"):
+            refined = refine(model, hero, options.refine_seconds)
         hero = refined.hero
-        sys.stderr.write("".join(f"{line}\n" for line in summary_lines(refined)))
-    hero = hero.symmetric() if symmetric else hero
-    ready = time.perf_counter()
-    with tqdm(total=float(frames + MESH_STEPS), desc="reconstruct", bar_format=BAR) as bar:
-        pictures = render_around(hero, frames, size, on_frame=bar.update)
-        rendered = time.perf_counter()
-        built = hero.build_mesh(
-            resolution=resolution,
-            num_cameras=num_cameras,
-            faces=faces,
-            smooth=smooth,
-            height=height,
-            texture=texture,
-            texture_size=texture_size,
-            on_points=meter(bar, (resolution,), MESH_STEPS),
-        )
-        bar.update((bar.total or 0) - bar.n)
+        for line in summary_lines(refined):
+            say(line)
+    pictures, built = _pictures_and_mesh(hero.symmetric() if options.symmetric else hero, options, seconds)
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
-        sys.stderr.write(f"{line}\n")
-    seconds = {
-        "encode": encoded - start,
-        **({} if refined is None else {"refine": ready - encoded}),
-        f"{frames} frames of {size} pixels": rendered - ready,
-        "mesh": time.perf_counter() - rendered,
-    }
-    output.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(dir=output.parent, prefix=f".{output.name}."))
-    try:
-        save_mesh(built.mesh, aside / "mesh.glb")
-        (aside / "meshes").mkdir()
-        contact_sheet(built.mesh, drawings.detailed).save(aside / "meshes" / "mesh_sheet.png")
-        film, film_note = write_film([bytes_on_white(picture) for picture in pictures], aside)
-        views = _write_views(pictures, aside / "views")
-        Image.fromarray(drawings.picture).save(aside / "drawings.png")
-        if refined is not None:
-            plot_curve(refined, aside / "refinement.png")
-        text = report_text(
-            drawings=drawings,
-            built=built,
-            film=film,
-            film_note=film_note,
-            views=views[:: max(1, len(views) // 4)],
-            seconds=seconds,
-            weights=model.source.name,
-            refined=refined,
-        )
-        (aside / "report.md").write_text(text, encoding="utf-8")
-        _move_into(aside, output)
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        say(line)
+    with _aside(output) as folder:
+        film, views = _write_pieces(folder, pictures, built, drawings, refined, seconds, model.source.name)
     return Reconstruction(
         mesh=output / "mesh.glb",
-        turntable=output / film.name,
-        views=tuple(output / "views" / view.name for view in views),
+        turntable=output / film,
+        views=tuple(output / "views" / view for view in views),
         report=output / "report.md",
         built=built,
         warnings=drawings.warnings,
         seconds=seconds,
     )
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note how long a stage took."""
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
+
+
+def _pictures_and_mesh(
+    hero: Hero, options: ReconstructionOptions, seconds: dict[str, float]
+) -> tuple[list[np.ndarray], BuiltMesh]:
+    """Pictures from around, RGBA uint8, and the mesh, with a progress bar."""
+    with tqdm(total=float(options.frames + MESH_STEPS), desc="reconstruct", bar_format=BAR) as bar:
+        with _timed(seconds, f"{options.frames} frames of {options.size} pixels"):
+            pictures = render_around(hero, options.frames, options.size, on_frame=bar.update)
+        with _timed(seconds, "mesh"):
+            on_points = meter(bar, (options.mesh.resolution,), MESH_STEPS)
+            built = hero.build_mesh(options.mesh, on_points=on_points)
+        bar.update((bar.total or 0) - bar.n)
+    return pictures, built
+
+
+def _write_pieces(
+    folder: Path,
+    pictures: list[np.ndarray],
+    built: BuiltMesh,
+    drawings: Turnaround,
+    refined: Finetuned | None,
+    seconds: dict[str, float],
+    weights: str,
+) -> tuple[str, list[str]]:
+    """Write mesh, turntable, views and report; names of the turntable and of the views."""
+    save_mesh(built.mesh, folder / "mesh.glb")
+    (folder / "meshes").mkdir()
+    contact_sheet(built.mesh, drawings.detailed).save(folder / "meshes" / "mesh_sheet.png")
+    film, film_note = write_film([bytes_on_white(picture) for picture in pictures], folder)
+    views = _write_views(pictures, folder / "views")
+    Image.fromarray(drawings.picture).save(folder / "drawings.png")
+    if refined is not None:
+        plot_curve(refined, folder / "refinement.png")
+    text = report_text(
+        drawings=drawings,
+        built=built,
+        film=film,
+        film_note=film_note,
+        views=views[:: max(1, len(views) // 4)],
+        seconds=seconds,
+        weights=weights,
+        refined=refined,
+    )
+    (folder / "report.md").write_text(text, encoding="utf-8")
+    return film.name, [view.name for view in views]
+
+
+@contextmanager
+def _aside(output: Path) -> Iterator[Path]:
+    """A folder beside OUTPUT to write into; what lies in it is moved into OUTPUT where nothing went wrong."""
+    output.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(dir=output.parent, prefix=f".{output.name}."))
+    try:
+        yield folder
+        _move_into(folder, output)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write_views(pictures: list[np.ndarray], folder: Path) -> list[Path]:

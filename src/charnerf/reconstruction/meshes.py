@@ -1,17 +1,19 @@
 """One character's mesh, or its levels of detail, as files with a contact sheet and a table."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tqdm import tqdm
 
 from charnerf.files import write_text
-from charnerf.geometry.framing import HEIGHT
-from charnerf.inference.hero import TEXTURE_SIZE, Hero, TextureKind
+from charnerf.inference.hero import Hero
+from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.convergence import convergence_lines, measure_convergence
 from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh
 from charnerf.meshing.lod import Lod, lod_report, named
+from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import level_lines, mesh_sentences, mesh_words
@@ -20,111 +22,102 @@ STEPS = 20.0  # of the progress bar
 
 
 @dataclass(frozen=True)
-class MeshRequest:
-    """What meshes are wanted.
-
-    Attributes:
-        resolutions: Grid points along the longest side, of each grid.
-        faces: Faces of decimated meshes; with one grid and one number, the only mesh has so many.
-        are_levels: Whether they are levels of detail even if there is but one grid.
-        num_cameras: Cameras whose directions the density is averaged over.
-        smooth: Rounds of smoothing.
-        symmetric: Whether densities are averaged over left and right.
-        convergence: Whether it is measured how many cameras are needed: NAME_cameras.md.
-        height: Of each, m.
-        texture: vertex, drawings or field.
-        texture_size: Texels a side.
-        suffix: File format, such as "glb".
-    """
-
-    resolutions: tuple[int, ...]
-    faces: tuple[int, ...] = ()
-    are_levels: bool = False
-    num_cameras: int = 8
-    smooth: int = 0
-    symmetric: bool = False
-    convergence: bool = False
-    height: float = HEIGHT
-    texture: TextureKind = "vertex"
-    texture_size: int = TEXTURE_SIZE
-    suffix: str = "glb"
-
-    @property
-    def is_single(self) -> bool:
-        """Whether one mesh is wanted, not levels of detail."""
-        return not self.are_levels and len(self.resolutions) == 1 and len(self.faces) <= 1
-
-
-@dataclass(frozen=True)
 class MeshFiles:
     """What was written.
 
     Attributes:
         meshes: Mesh files; levels of detail from the finest on.
+        built: The mesh, the finest of several.
         sheet: The contact sheet.
+        notes: What was assumed and made, sentences.
         lods: The levels by file name; empty for a single mesh.
-        said: What was assumed and made, sentences.
     """
 
     meshes: tuple[Path, ...]
+    built: BuiltMesh
     sheet: Path
-    lods: dict[str, Lod]
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
+    lods: dict[str, Lod] = field(default_factory=dict)
 
 
-def write_meshes(hero: Hero, name: str, output: Path, request: MeshRequest) -> MeshFiles:
-    """Write a character's mesh: OUTPUT/NAME.glb, or NAME_LOD0.glb and so on with lods.md and lods.json.
+def write_mesh(
+    hero: Hero, name: str, output: Path, options: MeshOptions, *, suffix: str = "glb"
+) -> MeshFiles:
+    """Write a character's mesh, OUTPUT/NAME.glb, and a contact sheet.
 
     Args:
         hero: The character.
         name: Its name.
         output: Folder; made if missing.
-        request: What is wanted.
+        options: How the mesh is made.
+        suffix: File format.
 
     Raises:
-        DataError: If an argument is out of range or the hull empty.
+        DataError: If the hull is empty, or there are too many faces for a texture.
         DependencyError: If the format needs a library that is missing.
         NumericalError: If the field is empty or not finite.
     """
-    hero = hero.symmetric() if request.symmetric else hero
-    found = _made(hero, name, request)
+    with tqdm(total=STEPS, desc=name, bar_format=BAR) as bar:
+        on_points = meter(bar, (options.resolution,), 0.8 * STEPS)
+        built = hero.build_mesh(options, on_points=on_points)
+        bar.update((bar.total or 0) - bar.n)
+    return _write(hero, name, output, {name: built}, suffix)
+
+
+def write_lods(
+    hero: Hero,
+    name: str,
+    output: Path,
+    options: MeshOptions,
+    *,
+    resolutions: Sequence[int],
+    faces: Sequence[int] = (),
+    suffix: str = "glb",
+) -> MeshFiles:
+    """Write a character's levels of detail, OUTPUT/NAME_LOD0.glb and so on, with lods.md, lods.json and a contact sheet.
+
+    Args:
+        hero: The character.
+        name: Its name.
+        output: Folder; made if missing.
+        options: How each mesh is made, grid and faces aside.
+        resolutions: Grids, points along the longest side.
+        faces: Faces to decimate the finest grid's surface to.
+        suffix: File format.
+
+    Raises:
+        ConfigError: If a grid or a number of faces is out of range.
+        DataError: As of `write_mesh`, and NumericalError and DependencyError.
+    """
+    with tqdm(total=STEPS, desc=name, bar_format=BAR) as bar:
+        on_points = meter(bar, resolutions, 0.8 * STEPS)
+        levels = hero.lods(options, resolutions=resolutions, faces=faces, on_points=on_points)
+        bar.update((bar.total or 0) - bar.n)
+    lods = named(levels, name)
+    files = _write(hero, name, output, {file: lod.built for file, lod in lods.items()}, suffix)
+    write_text(output / "lods.md", lod_report(lods))
+    rows = [{"file": file, **lod.row()} for file, lod in lods.items()]
+    write_text(output / "lods.json", json.dumps(rows, indent=2) + "\n")
+    return replace(files, lods=lods)
+
+
+def _write(hero: Hero, name: str, output: Path, meshes: dict[str, BuiltMesh], suffix: str) -> MeshFiles:
+    """Write meshes by file name and the sheet of the first."""
     output.mkdir(parents=True, exist_ok=True)
-    paths = tuple(
-        save_mesh(lod.built.mesh, output / f"{file}.{request.suffix}") for file, lod in found.items()
-    )
-    first = next(iter(found.values())).built
+    paths = [save_mesh(built.mesh, output / f"{file}.{suffix}") for file, built in meshes.items()]
+    first = next(iter(meshes.values()))
     sheet = output / f"{name}_sheet.png"
     contact_sheet(first.mesh, hero.views).save(sheet)
-    said = [f"{path}: {mesh_words(lod.built)}." for path, lod in zip(paths, found.values(), strict=True)]
-    said += mesh_sentences(first)
-    if request.texture != "vertex" and f".{request.suffix}" not in TEXTURED_SUFFIXES:
-        said.append(f"{request.suffix.upper()} carries no texture: the vertices got its colours.")
-    if request.convergence:
-        lines = [f"# {name}: level and cameras", "", *level_lines(first), ""]
-        lines += convergence_lines(measure_convergence(hero.scene, hero.views, level=first.level))
-        write_text(output / f"{name}_cameras.md", "\n".join(lines))
-        said += [line for line in lines if line]
-    if request.is_single:
-        return MeshFiles(paths, sheet, {}, tuple(said))
-    write_text(output / "lods.md", lod_report(found))
-    rows = [{"file": file, **lod.row()} for file, lod in found.items()]
-    write_text(output / "lods.json", json.dumps(rows, indent=2) + "\n")
-    return MeshFiles(paths, sheet, found, tuple(said))
+    notes = [f"{path}: {mesh_words(built)}." for path, built in zip(paths, meshes.values(), strict=True)]
+    notes += mesh_sentences(first)
+    if first.textured is not None and f".{suffix}" not in TEXTURED_SUFFIXES:
+        notes.append(f"{suffix.upper()} carries no texture: the vertices got its colours.")
+    return MeshFiles(tuple(paths), first, sheet, tuple(notes))
 
 
-def _made(hero: Hero, name: str, request: MeshRequest) -> dict[str, Lod]:
-    """The meshes by file name, with a progress bar."""
-    with tqdm(total=STEPS, desc=name, bar_format=BAR) as bar:
-        lods = hero.lods(
-            resolutions=request.resolutions,
-            faces=request.faces,
-            num_cameras=request.num_cameras,
-            smooth=request.smooth,
-            height=request.height,
-            texture=request.texture,
-            texture_size=request.texture_size,
-            decimated_only=request.is_single and bool(request.faces),
-            on_points=meter(bar, request.resolutions, 0.8 * STEPS),
-        )
-        bar.update((bar.total or 0) - bar.n)
-    return {name: lods[0]} if request.is_single else named(lods, name)
+def write_convergence(hero: Hero, name: str, output: Path, built: BuiltMesh) -> tuple[str, ...]:
+    """Measure how many cameras a mesh needs, and show levels beside the chosen one: OUTPUT/NAME_cameras.md; its lines."""
+    lines = [f"# {name}: level and cameras", "", *level_lines(built), ""]
+    lines += convergence_lines(measure_convergence(hero.scene, hero.views, level=built.level))
+    write_text(output / f"{name}_cameras.md", "\n".join(lines))
+    return tuple(line for line in lines if line)

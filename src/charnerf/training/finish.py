@@ -18,6 +18,7 @@ from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.extract import vertex_colours
+from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
 from charnerf.reporting.run_report import write_run_report
@@ -25,7 +26,6 @@ from charnerf.types import Scene, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
-MESH_RESOLUTION = 128  # of the one mesh that is kept
 
 
 def finish_run(
@@ -51,7 +51,7 @@ def finish_run(
     """
 
     def make_mesh(scene: Scene, views: SourceViews) -> BuiltMesh:
-        return build_mesh(scene, views, resolution=cfg.scale.mesh_resolution)
+        return build_mesh(scene, views, MeshOptions(resolution=cfg.scale.mesh_resolution, height=None))
 
     metrics = evaluate(
         model,
@@ -84,7 +84,7 @@ def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, train
         sources = load_character(root, name).sources.to(device)
         scene = model.scene(model.encode(sources), 0)
         try:
-            built = build_mesh(scene, sources, resolution=MESH_RESOLUTION)
+            built = build_mesh(scene, sources, MeshOptions(height=None))
         except NumericalError as error:  # too thin for a surface: the figures count all the same
             log.warning("No mesh of %s: %s", name, error)
             return
