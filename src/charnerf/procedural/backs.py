@@ -4,7 +4,7 @@ import numpy as np
 
 from charnerf.procedural.figure import Figure
 from charnerf.procedural.palette import WHITE
-from charnerf.procedural.parts import Part, flat
+from charnerf.procedural.parts import Painted, Part, flat
 from charnerf.procedural.shapes import (
     UP,
     Array,
@@ -26,68 +26,78 @@ from charnerf.procedural.textures import (
 
 def make_backpack(figure: Figure) -> list[Part]:
     """A pack with straps, a quiver, a tank, or a sword across the back."""
-    palette, parts = figure.palette, []
     centre, half = figure.trunk(0.62)
     kind = figure.choose("pack", "pack", "tank", "quiver", "sword", "shell")
     back = centre + np.array((0.0, half[1], 0.0))
     size = figure.build.waist * figure.between(0.55, 0.95)
-    if kind == "pack":
-        color = palette.leather if figure.chance(0.5) else palette.accent
-        deep = figure.between(0.07, 0.14)
-        pack = ball(
-            back + np.array((0.0, 0.8 * deep, 0.0)), (size, deep, 1.15 * size), sides=8, rings=6, power=4.0
+    make = {"pack": _pack, "tank": _tank, "quiver": _quiver, "sword": _sword_on_back, "shell": _shell}[kind]
+    return [flat("backpack", shape, color) for shape, color in make(figure, back, size)]
+
+
+def _pack(figure: Figure, back: Array, size: float) -> Painted:
+    """A pack with a pocket and straps, at times with a roll on top."""
+    palette = figure.palette
+    color = palette.leather if figure.chance(0.5) else palette.accent
+    deep = figure.between(0.07, 0.14)
+    pack = ball(
+        back + np.array((0.0, 0.8 * deep, 0.0)), (size, deep, 1.15 * size), sides=8, rings=6, power=4.0
+    )
+    pocket = box(back + np.array((0.0, 1.9 * deep, -0.35 * size)), (0.65 * size, 0.3 * deep, 0.35 * size))
+    painted: Painted = [(pack, color), (pocket, darker(color, 0.75))]
+    if figure.chance(0.5):
+        roll = np.stack(
+            (back + np.array((-size, deep, 1.3 * size)), back + np.array((size, deep, 1.3 * size)))
         )
-        parts += [flat("backpack", pack, color)]
-        pocket = box(back + np.array((0.0, 1.9 * deep, -0.35 * size)), (0.65 * size, 0.3 * deep, 0.35 * size))
-        parts.append(flat("backpack", pocket, darker(color, 0.75)))
-        if figure.chance(0.5):
-            roll = np.stack(
-                (back + np.array((-size, deep, 1.3 * size)), back + np.array((size, deep, 1.3 * size)))
+        painted.append((tube(roll, np.full(2, 0.3 * size), front=UP, sides=8), palette.second))
+    top, wide = figure.trunk(0.85, 1.12)
+    low, narrow = figure.trunk(0.45, 1.12)
+    for side in (-1.0, 1.0):
+        x = side * 0.5 * wide[0]
+        path = np.array(
+            (
+                (x, top[1] + 0.4 * wide[1], top[2] + 0.05),
+                (x, top[1] - 0.9 * wide[1], top[2]),
+                (x, low[1] - narrow[1] * 0.95, low[2]),
             )
-            parts.append(
-                flat("backpack", tube(roll, np.full(2, 0.3 * size), front=UP, sides=8), palette.second)
-            )
-    elif kind == "tank":
-        for side in (-0.5, 0.5):
-            path = back + np.array(((side * size, 0.06, -0.6 * size), (side * size, 0.06, 0.9 * size)))
-            parts.append(flat("backpack", tube(path, np.full(2, 0.42 * size), sides=8), palette.metal))
-    elif kind == "quiver":
-        path = back + np.array(((0.7 * size, 0.06, -0.7 * size), (-0.6 * size, 0.06, 1.1 * size)))
-        parts.append(flat("backpack", loft(path, np.array((0.06, 0.08)), sides=8), palette.leather))
-        for shift in (-0.03, 0.0, 0.03):
-            arrow = np.stack((path[0] + (shift, 0.0, 0.0), path[1] + np.array((shift - 0.06, 0.0, 0.12))))
-            parts.append(flat("backpack", loft(arrow, np.full(2, 0.014), sides=4), palette.accent))
-    elif kind == "sword":
-        path = back + np.array(
-            ((size, 0.04, -1.2 * size), (-0.8 * size, 0.04, 1.0 * size), (-1.15 * size, 0.04, 1.45 * size))
         )
-        parts.append(
-            flat("backpack", loft(path[:2], np.array(((0.06, 0.02), (0.06, 0.02))), sides=4), palette.metal)
-        )
-        parts.append(flat("backpack", loft(path[1:], np.full(2, 0.03), sides=6), palette.leather))
-    else:
-        shell = ball(back, (1.2 * size, 0.16, 1.4 * size), sides=10, rings=8)
-        parts.append(flat("backpack", shell, darker(palette.second, 0.8)))
-    if kind == "pack":
-        for side in (-1.0, 1.0):
-            top, wide = figure.trunk(0.85, 1.12)
-            low, narrow = figure.trunk(0.45, 1.12)
-            x = side * 0.5 * wide[0]
-            path = np.array(
-                (
-                    (x, top[1] + 0.4 * wide[1], top[2] + 0.05),
-                    (x, top[1] - 0.9 * wide[1], top[2]),
-                    (x, low[1] - narrow[1] * 0.95, low[2]),
-                )
-            )
-            parts.append(
-                flat(
-                    "backpack",
-                    loft(path, np.full((3, 2), 0.022), front=(1.0, 0.0, 0.0), sides=4),
-                    darker(palette.leather, 0.7),
-                )
-            )
-    return parts
+        strap = loft(path, np.full((3, 2), 0.022), front=(1.0, 0.0, 0.0), sides=4)
+        painted.append((strap, darker(palette.leather, 0.7)))
+    return painted
+
+
+def _tank(figure: Figure, back: Array, size: float) -> Painted:
+    """Two bottles."""
+    painted: Painted = []
+    for side in (-0.5, 0.5):
+        path = back + np.array(((side * size, 0.06, -0.6 * size), (side * size, 0.06, 0.9 * size)))
+        painted.append((tube(path, np.full(2, 0.42 * size), sides=8), figure.palette.metal))
+    return painted
+
+
+def _quiver(figure: Figure, back: Array, size: float) -> Painted:
+    """A quiver with three arrows."""
+    path = back + np.array(((0.7 * size, 0.06, -0.7 * size), (-0.6 * size, 0.06, 1.1 * size)))
+    painted: Painted = [(loft(path, np.array((0.06, 0.08)), sides=8), figure.palette.leather)]
+    for shift in (-0.03, 0.0, 0.03):
+        arrow = np.stack((path[0] + (shift, 0.0, 0.0), path[1] + np.array((shift - 0.06, 0.0, 0.12))))
+        painted.append((loft(arrow, np.full(2, 0.014), sides=4), figure.palette.accent))
+    return painted
+
+
+def _sword_on_back(figure: Figure, back: Array, size: float) -> Painted:
+    """A blade across the back, and its grip."""
+    path = back + np.array(
+        ((size, 0.04, -1.2 * size), (-0.8 * size, 0.04, 1.0 * size), (-1.15 * size, 0.04, 1.45 * size))
+    )
+    blade = loft(path[:2], np.array(((0.06, 0.02), (0.06, 0.02))), sides=4)
+    grip = loft(path[1:], np.full(2, 0.03), sides=6)
+    return [(blade, figure.palette.metal), (grip, figure.palette.leather)]
+
+
+def _shell(figure: Figure, back: Array, size: float) -> Painted:
+    """A turtle's shell."""
+    shell = ball(back, (1.2 * size, 0.16, 1.4 * size), sides=10, rings=8)
+    return [(shell, darker(figure.palette.second, 0.8))]
 
 
 def make_tail(figure: Figure) -> list[Part]:

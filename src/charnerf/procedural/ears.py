@@ -7,6 +7,8 @@ from charnerf.procedural.head import Head
 from charnerf.procedural.parts import Part, flat
 from charnerf.procedural.shapes import (
     UP,
+    Array,
+    Shape,
     ball,
     loft,
     tube,
@@ -19,60 +21,66 @@ from charnerf.procedural.textures import (
 
 def make_ears(figure: Figure, head: Head) -> list[Part]:
     """Human, pointed or animal ears."""
-    build, parts = figure.build, []
     centre, half = head.ring(figure, 0.45)
-    skin = darker(figure.palette.skin, 0.92)
+    top, wide = head.ring(figure, 0.88)
+    style = _style(figure)
+    long = figure.between(0.6, 1.1)
+    parts = []
+    for side in (-1.0, 1.0):
+        at_side = centre + np.array((side * half[0], 0.05 * half[1], 0.0))
+        on_top = top + np.array((side * 0.7 * wide[0], 0.0, 0.0))
+        if style in ("bunny", "cat"):
+            parts += _long_ear(figure, on_top, side, long if style == "bunny" else None)
+        else:
+            shape = _short_ear(figure, style, side, at_side, on_top, long)
+            parts.append(flat("ears", shape, darker(figure.palette.skin, 0.92)))
+    return parts
+
+
+def _style(figure: Figure) -> str:
+    """Animals' ears for fur, some creatures and few others; round or pointed ones else."""
     animal = (
         figure.surface == "fur"
         or (figure.surface == "creature" and figure.chance(0.4))
         or figure.chance(0.04)
     )
-    style = (
-        figure.choose("bunny", "cat", "bear", "mouse")
-        if animal
-        else figure.choose("round", "round", "round", "elf")
+    if animal:
+        return figure.choose("bunny", "cat", "bear", "mouse")
+    style = figure.choose("round", "round", "round", "elf")
+    return "elf" if figure.surface == "creature" and figure.chance(0.5) else style
+
+
+def _short_ear(figure: Figure, style: str, side: float, at_side: Array, on_top: Array, long: float) -> Shape:
+    """A round or pointed ear beside the head, or a bear's or mouse's on top."""
+    build = figure.build
+    if style == "round":
+        size = 0.2 * build.head
+        return ball(at_side, (0.25 * size, 0.45 * size, 0.6 * size), sides=8, rings=6)
+    if style == "elf":
+        path = np.stack((at_side, at_side + build.head_width * long * np.array((side * 0.9, 0.35, 0.35))))
+        return loft(path, np.array(((0.16, 0.06), (0.02, 0.01))) * build.head, sides=6)
+    size = build.head_width * (0.34 if style == "bear" else 0.6)
+    return ball(on_top + 0.4 * size * UP, (size, 0.3 * size, size), sides=10, rings=6)
+
+
+def _long_ear(figure: Figure, on_top: Array, side: float, long: float | None) -> list[Part]:
+    """A bunny's ear of a length, or a cat's, and its inside."""
+    build, skin = figure.build, figure.palette.skin
+    tall = build.head * (0.32 if long is None else 0.65 * long)
+    wide = build.head_width * (0.3 if long is None else 0.2)
+    lean = np.array((side * 0.15 * tall, 0.1 * tall, 0.0))
+    path = np.stack(
+        (on_top - 0.1 * tall * UP, on_top + 0.55 * tall * UP + lean, on_top + tall * UP + 1.6 * lean)
     )
-    if figure.surface == "creature" and not animal and figure.chance(0.5):
-        style = "elf"
-    long = figure.between(0.6, 1.1)
-    for side in (-1.0, 1.0):
-        at_side = centre + np.array((side * half[0], 0.05 * half[1], 0.0))
-        top, wide = head.ring(figure, 0.88)
-        on_top = top + np.array((side * 0.7 * wide[0], 0.0, 0.0))
-        if style == "round":
-            size = 0.2 * build.head
-            parts.append(
-                flat("ears", ball(at_side, (0.25 * size, 0.45 * size, 0.6 * size), sides=8, rings=6), skin)
-            )
-        elif style == "elf":
-            path = np.stack((at_side, at_side + build.head_width * long * np.array((side * 0.9, 0.35, 0.35))))
-            parts.append(
-                flat("ears", loft(path, np.array(((0.16, 0.06), (0.02, 0.01))) * build.head, sides=6), skin)
-            )
-        elif style in ("bear", "mouse"):
-            size = build.head_width * (0.34 if style == "bear" else 0.6)
-            parts.append(
-                flat(
-                    "ears", ball(on_top + 0.4 * size * UP, (size, 0.3 * size, size), sides=10, rings=6), skin
-                )
-            )
-        else:
-            tall = build.head * (0.65 * long if style == "bunny" else 0.32)
-            wide_ear = build.head_width * (0.2 if style == "bunny" else 0.3)
-            lean = np.array((side * 0.15 * tall, 0.1 * tall, 0.0))
-            path = np.stack(
-                (on_top - 0.1 * tall * UP, on_top + 0.55 * tall * UP + lean, on_top + tall * UP + 1.6 * lean)
-            )
-            shares = (
-                ((1.0, 0.4), (1.0, 0.4), (0.3, 0.1))
-                if style == "bunny"
-                else ((1.0, 0.5), (0.6, 0.3), (0.06, 0.04))
-            )
-            parts.append(flat("ears", loft(path, wide_ear * np.array(shares), sides=6), skin))
-            inner = path - np.array((0.0, 0.32 * wide_ear, 0.0))
-            pink = mix(figure.palette.skin, (0.95, 0.6, 0.65), 0.6)
-            parts.append(flat("ears", loft(inner, 0.6 * wide_ear * np.array(shares) + 0.002, sides=6), pink))
-    return parts
+    shares = np.array(
+        ((1.0, 0.5), (0.6, 0.3), (0.06, 0.04)) if long is None else ((1.0, 0.4), (1.0, 0.4), (0.3, 0.1))
+    )
+    inner = path - np.array((0.0, 0.32 * wide, 0.0))
+    pink = mix(skin, (0.95, 0.6, 0.65), 0.6)
+    return [
+        flat("ears", loft(path, wide * shares, sides=6), darker(skin, 0.92)),
+        flat("ears", loft(inner, 0.6 * wide * shares + 0.002, sides=6), pink),
+    ]
 
 
 def make_horns(figure: Figure, head: Head) -> list[Part]:

@@ -8,9 +8,10 @@ from charnerf.procedural.figure import Figure
 from charnerf.procedural.head import Head
 from charnerf.procedural.headwear import brim_seat, painted_cloth, turned
 from charnerf.procedural.helmets import make_great_helm, make_halo, make_headphones, make_helmet
-from charnerf.procedural.parts import Part, flat
+from charnerf.procedural.parts import Painted, Part, flat
 from charnerf.procedural.shapes import (
     UP,
+    Array,
     ball,
     lathe,
     loft,
@@ -188,55 +189,62 @@ def _pirate(figure: Figure, head: Head) -> list[Part]:
 def _band(figure: Figure, head: Head) -> list[Part]:
     """A headband, with feathers, knot, goggles or a lamp."""
     level = figure.between(0.66, 0.8)
-    centre, wide, deep = brim_seat(figure, head, level)
-    build, color = figure.build, figure.palette.accent
+    color = figure.palette.accent
     parts = [flat("headband", turned(figure, head, level, [(0.99, 0.0), (1.0, 0.1)]), color)]
     kind = figure.choose("knot", "goggles", "feathers", "plain")
-    if kind == "knot":
-        for lean in (-0.3, 0.4):
-            root = centre + np.array((0.0, deep, 0.05 * build.head))
-            path = np.stack(
-                (
-                    root,
-                    root + build.head * np.array((lean * 0.5, 0.2, -0.15)),
-                    root + build.head * np.array((lean, 0.3, -0.5)),
-                )
+    if kind == "plain":
+        return parts
+    add = {"knot": _knot, "goggles": _goggles, "feathers": _feathers}[kind]
+    return parts + [
+        flat("headband", shape, paint) for shape, paint in add(figure, *brim_seat(figure, head, level))
+    ]
+
+
+def _knot(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """The ends of a band knotted behind the head."""
+    build = figure.build
+    painted: Painted = []
+    for lean in (-0.3, 0.4):
+        root = centre + np.array((0.0, deep, 0.05 * build.head))
+        path = np.stack(
+            (
+                root,
+                root + build.head * np.array((lean * 0.5, 0.2, -0.15)),
+                root + build.head * np.array((lean, 0.3, -0.5)),
             )
-            parts.append(
-                flat(
-                    "headband",
-                    loft(
-                        path, build.head_width * np.array(((0.08, 0.05), (0.12, 0.04), (0.14, 0.03))), sides=4
-                    ),
-                    color,
-                )
-            )
-    elif kind == "goggles":
-        for side in (-1.0, 1.0):
-            path = (
-                centre
-                + np.array((side * 0.42 * wide, 0.0, 0.06 * build.head))
-                + np.outer((0.85, 1.12), (0.0, -deep, 0.0))
-            )
-            parts.append(
-                flat("headband", loft(path, np.full(2, 0.3 * wide), front=UP, sides=10), figure.palette.metal)
-            )
-            glass = ball(path[1], (0.22 * wide, 0.04 * wide, 0.22 * wide), rings=4)
-            parts.append(flat("headband", glass, figure.palette.second))
-    elif kind == "feathers":
-        for lean in np.linspace(-0.5, 0.5, int(figure.rng.integers(1, 6))):
-            root = centre + np.array((lean * wide, (0.9 if figure.chance(0.5) else -0.9) * deep, 0.03))
-            path = root + build.head * np.array(
-                ((0.0, 0.0, 0.0), (0.4 * lean, 0.0, 0.28), (0.8 * lean, 0.05, 0.55))
-            )
-            parts.append(
-                flat(
-                    "headband",
-                    loft(path, build.head * np.array(((0.03, 0.02), (0.07, 0.02), (0.01, 0.01))), sides=5),
-                    figure.palette.second,
-                )
-            )
-    return parts
+        )
+        radii = build.head_width * np.array(((0.08, 0.05), (0.12, 0.04), (0.14, 0.03)))
+        painted.append((loft(path, radii, sides=4), figure.palette.accent))
+    return painted
+
+
+def _goggles(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """Two glasses in metal."""
+    painted: Painted = []
+    for side in (-1.0, 1.0):
+        path = (
+            centre
+            + np.array((side * 0.42 * wide, 0.0, 0.06 * figure.build.head))
+            + np.outer((0.85, 1.12), (0.0, -deep, 0.0))
+        )
+        glass = ball(path[1], (0.22 * wide, 0.04 * wide, 0.22 * wide), rings=4)
+        painted += [
+            (loft(path, np.full(2, 0.3 * wide), front=UP, sides=10), figure.palette.metal),
+            (glass, figure.palette.second),
+        ]
+    return painted
+
+
+def _feathers(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """One to five feathers, before or behind."""
+    head = figure.build.head
+    painted: Painted = []
+    for lean in np.linspace(-0.5, 0.5, int(figure.rng.integers(1, 6))):
+        root = centre + np.array((lean * wide, (0.9 if figure.chance(0.5) else -0.9) * deep, 0.03))
+        path = root + head * np.array(((0.0, 0.0, 0.0), (0.4 * lean, 0.0, 0.28), (0.8 * lean, 0.05, 0.55)))
+        radii = head * np.array(((0.03, 0.02), (0.07, 0.02), (0.01, 0.01)))
+        painted.append((loft(path, radii, sides=5), figure.palette.second))
+    return painted
 
 
 HATS: tuple[tuple[Callable[[Figure, Head], list[Part]], float], ...] = (

@@ -5,9 +5,10 @@ import numpy as np
 from charnerf.procedural.figure import Figure
 from charnerf.procedural.head import Head
 from charnerf.procedural.headwear import brim_seat, turned
-from charnerf.procedural.parts import Part, flat
+from charnerf.procedural.parts import Painted, Part, flat
 from charnerf.procedural.shapes import (
     UP,
+    Array,
     box,
     lathe,
     loft,
@@ -26,65 +27,59 @@ def make_helmet(figure: Figure, head: Head) -> list[Part]:
     dome = turned(
         figure, head, level, [(1.04, 0.0), (1.05, 0.35 * tall), (0.9, 0.75 * tall), (0.4, 1.05 * tall)]
     )
-    parts = [
-        flat("helmet", dome, metal),
-        flat("helmet", turned(figure, head, level, [(1.1, -0.03), (1.1, 0.07)]), darker(metal, 0.7)),
-    ]
-    build = figure.build
-    centre, wide, deep = brim_seat(figure, head, level)
+    rim = turned(figure, head, level, [(1.1, -0.03), (1.1, 0.07)])
+    seat = brim_seat(figure, head, level)
+    painted: Painted = [(dome, metal), (rim, darker(metal, 0.7)), *_guards(figure, *seat)]
+    kind = figure.choose("crest", "spike", "horns", "plain", "horns")
+    if kind != "plain":
+        painted += {"crest": _crest, "spike": _spike, "horns": _horns}[kind](figure, *seat)
+    return [flat("helmet", shape, color) for shape, color in painted]
+
+
+def _guards(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """A guard of the nose and of the cheeks, if there are any."""
+    head, metal = figure.build.head, figure.palette.metal
+    painted: Painted = []
     if figure.chance(0.4):
-        guard = box((0.0, 0.0, 0.0), (0.1 * wide, 0.06 * deep, 0.2 * build.head))
-        parts.append(
-            flat(
-                "helmet",
-                guard.moved(np.eye(3), centre + np.array((0.0, -1.0 * deep, -0.12 * build.head))),
-                darker(metal, 0.8),
-            )
-        )
+        guard = box((0.0, 0.0, 0.0), (0.1 * wide, 0.06 * deep, 0.2 * head))
+        before = centre + np.array((0.0, -1.0 * deep, -0.12 * head))
+        painted.append((guard.moved(np.eye(3), before), darker(metal, 0.8)))
     if figure.chance(0.5):
         for side in (-1.0, 1.0):
-            cheek = box(
-                centre + np.array((side * 0.98 * wide, -0.15 * deep, -0.2 * build.head)),
-                (0.06 * wide, 0.4 * deep, 0.2 * build.head),
-            )
-            parts.append(flat("helmet", cheek, metal))
+            beside = centre + np.array((side * 0.98 * wide, -0.15 * deep, -0.2 * head))
+            painted.append((box(beside, (0.06 * wide, 0.4 * deep, 0.2 * head)), metal))
+    return painted
+
+
+def _crest(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """A crest from front to back."""
+    build = figure.build
+    angle = np.deg2rad(np.linspace(-70.0, 100.0, 8))
+    arc = np.stack((np.zeros(8), deep * np.sin(angle), 0.5 * build.head * np.cos(angle)), axis=-1) * 1.1
+    radii = np.stack((np.full(8, 0.1 * wide), np.full(8, build.head * figure.between(0.1, 0.18))), axis=-1)
+    return [(loft(build.head_centre + arc, radii, front=(0.0, -0.4, 1.0), sides=4), figure.palette.accent)]
+
+
+def _spike(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """A spike on top."""
+    build = figure.build
     top = build.head_centre + 0.54 * build.head * UP
-    kind = figure.choose("crest", "spike", "horns", "plain", "horns")
-    if kind == "crest":
-        angle = np.deg2rad(np.linspace(-70.0, 100.0, 8))
-        arc = np.stack((np.zeros(8), deep * np.sin(angle), 0.5 * build.head * np.cos(angle)), axis=-1) * 1.1
-        radii = np.stack(
-            (np.full(8, 0.1 * wide), np.full(8, build.head * figure.between(0.1, 0.18))), axis=-1
+    profile = [(0.12 * wide, -0.03), (0.1 * wide, 0.05), (0.01, 0.3 * build.head)]
+    return [(lathe(top, profile, sides=6), darker(figure.palette.metal, 1.1))]
+
+
+def _horns(figure: Figure, centre: Array, wide: float, deep: float) -> Painted:
+    """Two horns that bend upwards."""
+    build = figure.build
+    painted: Painted = []
+    for side in (-1.0, 1.0):
+        root = centre + np.array((side * 0.9 * wide, 0.0, 0.2 * build.head))
+        path = root + build.head * np.array(
+            ((0.0, 0.0, 0.0), (side * 0.28, 0.0, 0.06), (side * 0.38, -0.05, 0.3))
         )
-        parts.append(
-            flat(
-                "helmet",
-                loft(build.head_centre + arc, radii, front=(0.0, -0.4, 1.0), sides=4),
-                figure.palette.accent,
-            )
-        )
-    elif kind == "spike":
-        parts.append(
-            flat(
-                "helmet",
-                lathe(top, [(0.12 * wide, -0.03), (0.1 * wide, 0.05), (0.01, 0.3 * build.head)], sides=6),
-                darker(metal, 1.1),
-            )
-        )
-    elif kind == "horns":
-        for side in (-1.0, 1.0):
-            root = centre + np.array((side * 0.9 * wide, 0.0, 0.2 * build.head))
-            path = root + build.head * np.array(
-                ((0.0, 0.0, 0.0), (side * 0.28, 0.0, 0.06), (side * 0.38, -0.05, 0.3))
-            )
-            parts.append(
-                flat(
-                    "helmet",
-                    loft(path, build.head_width * np.array((0.22, 0.16, 0.02)), sides=7),
-                    (0.9, 0.87, 0.76),
-                )
-            )
-    return parts
+        horn = loft(path, build.head_width * np.array((0.22, 0.16, 0.02)), sides=7)
+        painted.append((horn, (0.9, 0.87, 0.76)))
+    return painted
 
 
 def make_great_helm(figure: Figure, head: Head) -> list[Part]:

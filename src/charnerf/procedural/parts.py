@@ -24,6 +24,9 @@ class Part:
     texels: Texels
 
 
+Painted = list[tuple[Shape, ArrayLike]]  # shapes, each of one sRGB colour
+
+
 def flat(name: str, shape: Shape, color: ArrayLike) -> Part:
     """A part of one sRGB colour."""
     texel = (np.clip(np.asarray(color, dtype=np.float64), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)

@@ -9,6 +9,7 @@ from charnerf.procedural.shapes import box
 from charnerf.procedural.textures import Color, darker, mix
 
 Block = NDArray[np.int64]  # (x, y, z) of colour numbers; 0 is empty
+Corner = tuple[int, int, int]  # x, y, z, or a width, depth and height, cubes
 
 
 class Voxels:
@@ -141,65 +142,93 @@ def _paint_face(voxels: Voxels, head: Block) -> None:
         head[:, 0, level] = np.where(head[:, 0, level] == eye, eye, voxels.color(palette.accent))
 
 
-def _add_hair(voxels: Voxels, corner: tuple[int, int, int], size: tuple[int, int, int]) -> None:
+def _add_hair(voxels: Voxels, corner: Corner, size: Corner) -> None:
     """Hair, a hat, a helmet or ears over a head."""
     rng, palette = voxels.rng, voxels.palette
-    (x, y, z), (width, depth, height) = corner, size
     hair, main = (
         voxels.color(palette.hair),
         voxels.color(palette.main if rng.uniform() < 0.5 else palette.accent),
     )
     kind = int(rng.integers(8))
-    if kind in (0, 1, 2):
-        drop = int(rng.integers(1, height + (2 if kind == 2 else 0)))
-        voxels.add(
-            "hair",
-            (x - (kind == 2), y - (kind != 0), z + height - 1),
-            (width + 2 * (kind == 2), depth + 1 + (kind != 0), 2),
-            hair,
-        )
-        voxels.add("hair", (x, y + depth, z + height - 1 - drop), (width, 1, drop), hair)
-        if kind == 1 or rng.uniform() < 0.4:
-            side = int(rng.integers(1, height))
-            for column in (x - 1, x + width):
-                voxels.add("hair", (column, y + 1, z + height - side), (1, depth, side), hair)
+    if kind < 3:
+        _add_cut(voxels, corner, size, hair, kind)
     elif kind == 3:
-        voxels.add("hair", (x + width // 2 - 1, y, z + height), (2, depth + 1, int(rng.integers(1, 4))), hair)
-        voxels.add(
-            "hair", (x + width // 2 - 1, y + depth, z + height // 2), (2, 1, height - height // 2), hair
-        )
+        _add_mohawk(voxels, corner, size, hair)
     elif kind == 4:
-        brim = int(rng.integers(1, 3))
-        voxels.add("hat", (x - brim, y - brim, z + height), (width + 2 * brim, depth + 2 * brim, 1), main)
-        tall = int(rng.integers(1, 5))
-        crown = voxels.add("hat", (x + 1, y + 1, z + height + 1), (width - 2, max(depth - 2, 1), tall), main)
-        crown[:, :, 0] = voxels.color(palette.second)
+        _add_tall_hat(voxels, corner, size, main)
     elif kind == 5:
-        voxels.add("hat", (x, y, z + height), (width, depth, 1), main)
-        voxels.add("hat", (x, y - 2, z + height - 1), (width, 2, 1), voxels.color(darker(palette.main, 0.7)))
-        voxels.add("hair", (x, y + depth, z + 1), (width, 1, height - 1), hair)
+        _add_cap(voxels, corner, size, main, hair)
     elif kind == 6:
-        helmet = voxels.add(
-            "helmet",
-            (x - 1, y - 1, z + height // 2),
-            (width + 2, depth + 2, height - height // 2 + 1),
-            voxels.color(palette.metal),
-        )
-        helmet[2:-2, 0, :-2] = 0
-        if rng.uniform() < 0.6:
-            for column in (x - 2, x + width + 1):
-                voxels.add(
-                    "helmet", (column, y + 1, z + height - 1), (1, 1, 3), voxels.color((0.9, 0.87, 0.78))
-                )
+        _add_helmet(voxels, corner, size)
     else:
-        tall = int(rng.integers(1, 5))
-        for column in (x, x + width - 1 - (tall < 3)):
-            voxels.add(
-                "ears",
-                (column, y + depth // 2, z + height),
-                (1 + (tall < 3), 1, tall),
-                voxels.color(palette.skin),
-            )
+        _add_ears(voxels, corner, size)
+
+
+def _add_cut(voxels: Voxels, corner: Corner, size: Corner, hair: int, kind: int) -> None:
+    """Hair over the top and back, of kind 2 wider and longer; at times over the sides too."""
+    (x, y, z), (width, depth, height), rng = corner, size, voxels.rng
+    drop = int(rng.integers(1, height + (2 if kind == 2 else 0)))
+    wider = int(kind == 2)
+    voxels.add(
+        "hair",
+        (x - wider, y - (kind != 0), z + height - 1),
+        (width + 2 * wider, depth + 1 + (kind != 0), 2),
+        hair,
+    )
+    voxels.add("hair", (x, y + depth, z + height - 1 - drop), (width, 1, drop), hair)
+    if kind == 1 or rng.uniform() < 0.4:
+        side = int(rng.integers(1, height))
+        for column in (x - 1, x + width):
+            voxels.add("hair", (column, y + 1, z + height - side), (1, depth, side), hair)
+
+
+def _add_mohawk(voxels: Voxels, corner: Corner, size: Corner, hair: int) -> None:
+    (x, y, z), (width, depth, height) = corner, size
+    left = x + width // 2 - 1
+    voxels.add("hair", (left, y, z + height), (2, depth + 1, int(voxels.rng.integers(1, 4))), hair)
+    voxels.add("hair", (left, y + depth, z + height // 2), (2, 1, height - height // 2), hair)
+
+
+def _add_tall_hat(voxels: Voxels, corner: Corner, size: Corner, main: int) -> None:
+    """A hat with a brim and a band."""
+    (x, y, z), (width, depth, height), rng = corner, size, voxels.rng
+    brim = int(rng.integers(1, 3))
+    voxels.add("hat", (x - brim, y - brim, z + height), (width + 2 * brim, depth + 2 * brim, 1), main)
+    tall = int(rng.integers(1, 5))
+    crown = voxels.add("hat", (x + 1, y + 1, z + height + 1), (width - 2, max(depth - 2, 1), tall), main)
+    crown[:, :, 0] = voxels.color(voxels.palette.second)
+
+
+def _add_cap(voxels: Voxels, corner: Corner, size: Corner, main: int, hair: int) -> None:
+    """A cap with a peak, hair behind."""
+    (x, y, z), (width, depth, height) = corner, size
+    peak = voxels.color(darker(voxels.palette.main, 0.7))
+    voxels.add("hat", (x, y, z + height), (width, depth, 1), main)
+    voxels.add("hat", (x, y - 2, z + height - 1), (width, 2, 1), peak)
+    voxels.add("hair", (x, y + depth, z + 1), (width, 1, height - 1), hair)
+
+
+def _add_helmet(voxels: Voxels, corner: Corner, size: Corner) -> None:
+    """A helmet that leaves the face free, at times with horns."""
+    (x, y, z), (width, depth, height) = corner, size
+    metal = voxels.color(voxels.palette.metal)
+    low = height // 2
+    helmet = voxels.add("helmet", (x - 1, y - 1, z + low), (width + 2, depth + 2, height - low + 1), metal)
+    helmet[2:-2, 0, :-2] = 0
+    if voxels.rng.uniform() < 0.6:
+        horn = voxels.color((0.9, 0.87, 0.78))
+        for column in (x - 2, x + width + 1):
+            voxels.add("helmet", (column, y + 1, z + height - 1), (1, 1, 3), horn)
+
+
+def _add_ears(voxels: Voxels, corner: Corner, size: Corner) -> None:
+    """Ears on top: thin long ones or wide short ones."""
+    (x, y, z), (width, depth, height) = corner, size
+    tall = int(voxels.rng.integers(1, 5))
+    wider = int(tall < 3)
+    skin = voxels.color(voxels.palette.skin)
+    for column in (x, x + width - 1 - wider):
+        voxels.add("ears", (column, y + depth // 2, z + height), (1 + wider, 1, tall), skin)
 
 
 def _add_extras(voxels: Voxels, width: int, depth: int, low: int, high: int) -> None:
@@ -228,51 +257,22 @@ def _add_extras(voxels: Voxels, width: int, depth: int, low: int, high: int) -> 
 def make_voxel_parts(rng: np.random.Generator) -> list[Part]:
     """A character of cubes, one unit a cube."""
     surface = ("human", "human", "human", "creature", "robot", "fur")[int(rng.integers(6))]
-    palette = make_palette(rng, surface)
-    voxels = Voxels(rng, palette)
+    voxels = Voxels(rng, make_palette(rng, surface))
     fine = int(rng.integers(1, 3))
     leg_width, leg_height = int(rng.integers(1, 3)) + fine - 1, int(rng.integers(2, 6)) * fine
     width, depth = 2 * int(rng.integers(2, 4)) * fine, int(rng.integers(2, 5)) * fine
     torso_height = int(rng.integers(3, 6)) * fine
     leg_width = min(max(leg_width, width // 4), width // 2)
+    palette = voxels.palette
     skin, cloth, trousers, boots = (
         voxels.color(value) for value in (palette.skin, palette.main, palette.trousers, palette.boots)
     )
-    half = width // 2
-    inset = int(rng.integers(0, max(1, half - leg_width + 1)))
-    leg_depth = max(1, depth - int(rng.integers(0, 2)))
-    for name, start in (("left_leg", half - inset - leg_width), ("right_leg", -half + inset)):
-        leg = voxels.add(
-            name, (start, (depth - leg_depth) // 2, 0), (leg_width, leg_depth, leg_height), trousers
-        )
-        leg[:, :, : max(1, leg_height // 4)] = boots
-        toe = int(rng.integers(0, 2))
-        if toe:
-            voxels.add(name, (start, (depth - leg_depth) // 2 - 1, 0), (leg_width, 1, 1), boots)
-    torso = voxels.add("trunk", (-half, 0, leg_height), (width, depth, torso_height), cloth)
+    _add_legs(voxels, (leg_width, depth, leg_height), width // 2, trousers, boots)
+    torso = voxels.add("trunk", (-(width // 2), 0, leg_height), (width, depth, torso_height), cloth)
     _paint_torso(voxels, torso, cloth)
     shoulder = leg_height + torso_height
     arm = min(int(rng.integers(1, 3)) * fine, torso_height)
-    level = rng.uniform() < 0.5
-    reach = int(rng.integers(2, 5)) * fine if level else max(1, torso_height - int(rng.integers(0, 2)))
-    sleeve = int(rng.integers(0, reach + 1))
-    for name, sign in (("left_arm", 1), ("right_arm", -1)):
-        if level:
-            block = voxels.add(
-                name,
-                (half if sign > 0 else -half - reach, (depth - min(arm, depth)) // 2, shoulder - arm),
-                (reach, min(arm, depth), arm),
-                skin,
-            )
-            block[(slice(0, sleeve) if sign > 0 else slice(reach - sleeve, reach)), :, :] = cloth
-        else:
-            block = voxels.add(
-                name,
-                (half if sign > 0 else -half - arm, 0, shoulder - reach),
-                (arm, min(depth, arm + 1), reach),
-                skin,
-            )
-            block[:, :, reach - sleeve :] = cloth
+    _add_arms(voxels, (arm, depth, torso_height), width // 2, shoulder, fine, skin, cloth)
     head_width = max(4, width + 2 * int(rng.integers(-1, 2)) * fine)
     head_size = (
         head_width,
@@ -280,8 +280,40 @@ def make_voxel_parts(rng: np.random.Generator) -> list[Part]:
         max(int(rng.integers(3, 6)) * fine, int(0.7 * head_width)),
     )
     head_corner = (-(head_width // 2), (depth - head_size[1]) // 2, shoulder)
-    head = voxels.add("head", head_corner, head_size, skin)
-    _paint_face(voxels, head)
+    _paint_face(voxels, voxels.add("head", head_corner, head_size, skin))
     _add_hair(voxels, head_corner, head_size)
     _add_extras(voxels, width, depth, leg_height, shoulder)
     return voxels.parts()
+
+
+def _add_legs(voxels: Voxels, size: Corner, half: int, trousers: int, boots: int) -> None:
+    """Legs in boots below a trunk of a half width; size: a leg's width, the trunk's depth, the legs' height."""
+    (width, depth, height), rng = size, voxels.rng
+    inset = int(rng.integers(0, max(1, half - width + 1)))
+    leg_depth = max(1, depth - int(rng.integers(0, 2)))
+    front = (depth - leg_depth) // 2
+    for name, start in (("left_leg", half - inset - width), ("right_leg", -half + inset)):
+        leg = voxels.add(name, (start, front, 0), (width, leg_depth, height), trousers)
+        leg[:, :, : max(1, height // 4)] = boots
+        if int(rng.integers(0, 2)):
+            voxels.add(name, (start, front - 1, 0), (width, 1, 1), boots)
+
+
+def _add_arms(
+    voxels: Voxels, size: Corner, half: int, shoulder: int, fine: int, skin: int, cloth: int
+) -> None:
+    """Arms in sleeves, held out level or hanging; size: an arm's thickness, the trunk's depth and height."""
+    (arm, depth, torso_height), rng = size, voxels.rng
+    level = rng.uniform() < 0.5
+    reach = int(rng.integers(2, 5)) * fine if level else max(1, torso_height - int(rng.integers(0, 2)))
+    sleeve = int(rng.integers(0, reach + 1))
+    deep = min(arm, depth) if level else min(depth, arm + 1)
+    for name, left in (("left_arm", True), ("right_arm", False)):
+        if level:
+            corner = (half if left else -half - reach, (depth - deep) // 2, shoulder - arm)
+            block = voxels.add(name, corner, (reach, deep, arm), skin)
+            block[slice(0, sleeve) if left else slice(reach - sleeve, reach), :, :] = cloth
+        else:
+            corner = (half if left else -half - arm, 0, shoulder - reach)
+            block = voxels.add(name, corner, (arm, deep, reach), skin)
+            block[:, :, reach - sleeve :] = cloth
