@@ -8,6 +8,7 @@ from charnerf.drawings.align import figure_box, half_extent, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array
 from charnerf.drawings.naming import name_views
+from charnerf.drawings.read_sheet import read_sheet
 from charnerf.drawings.sheet import find_figures
 from charnerf.drawings.viewpoints import Viewpoint, viewpoint
 from charnerf.errors import DataError
@@ -135,3 +136,44 @@ def test_names_and_angles_of_views():
             viewpoint(wrong)
     with pytest.raises(DataError, match="an elevation within 80"):
         viewpoint("0,89")
+
+
+def test_a_sheet_is_read_whole():
+    pixels, _ = sheet(["front", "side", "back"], lines=True)
+    read = read_sheet(pixels)
+    assert [view.name for view in read.drawings] == ["front", "left", "back"]
+    assert "3 figures" in read.assumptions[0] and "1 front, 2 left, 3 back" in read.assumptions[0]
+    assert "a swatch or a panel (4)" in read.assumptions[1] and not read.warnings
+    assert (read.picture == (220, 40, 40)).all(-1).sum() > 500
+
+
+def test_names_can_be_given():
+    pixels, _ = sheet(["front", "side", "back", "right"])
+    named = read_sheet(pixels, order=["back", "side", "front", "-"]).drawings
+    assert [view.name for view in named] == ["front", "left", "back"]
+    moved = read_sheet(pixels, figures={"45": 4}).drawings
+    assert Viewpoint(45.0) in moved
+    with pytest.raises(
+        DataError, match=r"--order: found 2 names \(front, back\), expected one for each of the 4"
+    ):
+        read_sheet(pixels, order=["front", "back"])
+    with pytest.raises(DataError, match="--figure back=5: found no such figure, expected 1 to 4"):
+        read_sheet(pixels, figures={"back": 5})
+
+
+def test_one_figure_is_no_sheet():
+    pixels, _ = sheet(["front"])
+    with pytest.raises(DataError, match="found one figure, expected a sheet with at least two views"):
+        read_sheet(pixels)
+
+
+def test_two_characters_are_noticed():
+    pixels, boxes = sheet(["front", "side", "back"])
+    left, top, right, bottom = boxes[2]
+    other = pixels.copy()
+    other[top:bottom, left:right] = np.where(  # a figure in other colours
+        np.abs(pixels[top:bottom, left:right].astype(int) - PAPER).sum(-1, keepdims=True) > 30,
+        255 - pixels[top:bottom, left:right][..., ::-1] // 2,
+        pixels[top:bottom, left:right],
+    )
+    assert any("are they of one character?" in one for one in read_sheet(other).warnings)

@@ -21,6 +21,7 @@ TURNS = {  # views of a sheet by how many there are, in the order in which a fig
     4: (("front", "three-quarter", "side", "back"), ("front", "side", "back", "other side")),
     5: (("front", "three-quarter", "side", "three-quarter back", "back"),),
 }
+MOST_NAMED = max(TURNS)
 DOUBTFUL = 0.08  # lead of the best naming over the next one below which the user is asked to look
 LAYOUT_WEIGHT = 0.1
 FIRST_WEIGHT = 0.25  # of a front that stands before the back
@@ -85,6 +86,11 @@ def name_views(canvases: Sequence[np.ndarray]) -> Naming:
         f"symmetry: {', '.join(f'{one.symmetry:.2f}' for one in looks)}",
     )
     return Naming(viewpoints, bool(lead < DOUBTFUL), reasons)
+
+
+def looks_left(canvas: np.ndarray) -> bool:
+    """Whether a figure seen from a side (S, S, 4) looks to the picture's left, by its feet and its face."""
+    return _looks(canvas).direction < 0
 
 
 def _viewpoint(role: str, best: dict[str, int], looks: Sequence[_Looks]) -> Viewpoint:

@@ -1,0 +1,199 @@
+"""A sheet to drawings by where they are seen from: what was taken for what, said in sentences and drawn in a picture."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from scipy import ndimage
+from skimage.color import rgb2lab
+
+from charnerf.drawings.align import figure_box, half_extent, place
+from charnerf.drawings.cutout import cut_out
+from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
+from charnerf.drawings.naming import MOST_NAMED, looks_left, name_views
+from charnerf.drawings.sheet import Sheet, find_figures
+from charnerf.drawings.viewpoints import Viewpoint, viewpoint
+from charnerf.errors import DataError
+from charnerf.pictures import bytes_on_white, to_bytes
+
+CANVAS = 96  # pixels a side of the canvases that views are named on
+ALIKE = 0.5  # overlap of the figures' colours below which they may be of two characters; of one it is 0.8 and more
+PICTURE_SIDE = 1200  # pixels, at most
+FIGURE, ASIDE = (220, 40, 40), (150, 150, 150)
+
+
+@dataclass(frozen=True)
+class SheetViews:
+    """Drawings of a sheet.
+
+    Attributes:
+        drawings: RGBA (H, W, 4) by where they are seen from; front first, then sides, then back.
+        assumptions: What was taken for what, sentences.
+        warnings: What is doubtful, with what to type instead.
+        picture: RGB uint8 (H, W, 3): the sheet with its figures numbered and named, and what was left aside.
+    """
+
+    drawings: dict[Viewpoint, np.ndarray]
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
+    picture: np.ndarray
+
+
+def read_sheet(
+    source: str | Path | np.ndarray,
+    *,
+    order: Sequence[str] = (),
+    figures: Mapping[str, int] | None = None,
+) -> SheetViews:
+    """Take a sheet apart and name its views.
+
+    Args:
+        source: Picture file or array (H, W, 3 or 4).
+        order: Names of the figures in reading order, such as front, side, back; `side` is left or right, whichever way
+            it looks; `-` leaves a figure out. Empty: they are found.
+        figures: Which figure shows a view, by its name, counted from 1 in reading order; instead of what was found.
+
+    Raises:
+        DataError: If there are fewer than two figures, more than can be named, or the names do not fit.
+    """
+    drawing = (
+        load_drawing(source)
+        if not isinstance(source, np.ndarray)
+        else drawing_from_array(source, "the sheet")
+    )
+    sheet = find_figures(drawing)
+    count = len(sheet.figures)
+    if count < 2:
+        raise DataError(
+            f"{drawing.name}: found one figure, expected a sheet with at least two views. Give views one by one: FRONT SIDE"
+            " BACK, or --view 0=FRONT --view 90=SIDE."
+        )
+    canvases = _canvases(sheet)
+    views, doubtful = _views(drawing, canvases, order, figures or {})
+    chosen = [(view, index) for index, view in views.items() if view is not None]
+    shown = [view.name for view, _ in chosen]
+    chosen.sort(key=lambda pair: (min(pair[0].azimuth_deg, 360.0 - pair[0].azimuth_deg), pair[0].azimuth_deg))
+    return SheetViews(
+        drawings={view: sheet.figures[index].drawing.rgba for view, index in chosen},
+        assumptions=(
+            f"{drawing.name}: {count} figures, from the left, row by row: "
+            + ", ".join(f"{index + 1} {_name(view)}" for index, view in views.items())
+            + ".",
+            *_asides(sheet),
+        ),
+        warnings=tuple(_warnings(drawing, canvases, chosen, doubtful, shown)),
+        picture=_picture(drawing, sheet, views),
+    )
+
+
+def _canvases(sheet: Sheet) -> list[np.ndarray]:
+    """The figures cut out and brought to one height, (CANVAS, CANVAS, 4) each."""
+    cut = [cut_out(one.drawing).rgba for one in sheet.figures]
+    boxes = [figure_box(rgba[..., 3], one.drawing.name) for rgba, one in zip(cut, sheet.figures, strict=True)]
+    extent = half_extent([(rgba[..., 3], box) for rgba, box in zip(cut, boxes, strict=True)])
+    return [place(rgba, box, extent=extent, size=CANVAS) for rgba, box in zip(cut, boxes, strict=True)]
+
+
+def _views(
+    drawing: Drawing, canvases: Sequence[np.ndarray], order: Sequence[str], figures: Mapping[str, int]
+) -> tuple[dict[int, Viewpoint | None], bool]:
+    """View of each figure by its index, None for one that is left out; and whether that is doubtful."""
+    count = len(canvases)
+    naming = name_views(canvases) if count <= MOST_NAMED else None
+    if order and len(order) != count:
+        raise DataError(
+            f"--order: found {len(order)} names ({', '.join(order)}), expected one for each of the {count} figures of"
+            f" {drawing.name}, in reading order; `-` leaves one out."
+        )
+    if naming is None and not order and len(figures) < 2:
+        raise DataError(
+            f"{drawing.name}: found {count} figures, expected at most {MOST_NAMED} to name by themselves. Say which is which:"
+            f" --order {','.join(['front', 'side', 'back', *['-'] * (count - 3)])}, or --figure front=1 --figure back=3."
+        )
+    views: dict[int, Viewpoint | None] = dict.fromkeys(range(count))
+    if order:
+        views |= {i: None if name == "-" else _named(name, canvases[i]) for i, name in enumerate(order)}
+    elif not figures or naming is not None:
+        assert naming is not None
+        views |= dict(enumerate(naming.viewpoints))
+    for name, number in figures.items():
+        if not 1 <= number <= count:
+            raise DataError(f"--figure {name}={number}: found no such figure, expected 1 to {count}.")
+        wanted = _named(name, canvases[number - 1])
+        views |= {i: None for i, view in views.items() if view == wanted}
+        views[number - 1] = wanted
+    return views, naming is not None and naming.is_doubtful and not order and not figures
+
+
+def _named(name: str, canvas: np.ndarray) -> Viewpoint:
+    """A viewpoint by its name; `side` looks whichever way the figure does."""
+    if name != "side":
+        return viewpoint(name)
+    return viewpoint("left" if looks_left(canvas) else "right")
+
+
+def _name(view: Viewpoint | None) -> str:
+    return "left out" if view is None else view.name
+
+
+def _asides(sheet: Sheet) -> list[str]:
+    """What was left aside, counted by reason."""
+    reasons = [one.reason for one in sheet.left_aside]
+    if not reasons:
+        return []
+    counts = ", ".join(f"{reason} ({reasons.count(reason)})" for reason in dict.fromkeys(reasons))
+    return [f"Left aside: {counts}."]
+
+
+def _warnings(
+    drawing: Drawing,
+    canvases: Sequence[np.ndarray],
+    chosen: Sequence[tuple[Viewpoint, int]],
+    doubtful: bool,
+    shown: Sequence[str],
+) -> list[str]:
+    lines = []
+    if doubtful:
+        lines.append(
+            f"{drawing.name}: which view is which is doubtful. If it is not {','.join(shown)}, say so: --order"
+            f" {','.join(reversed(shown))}, say, or --figure back=1."
+        )
+    colors = {index: _histogram(canvases[index]) for _, index in chosen}
+    first_view, first = chosen[0]
+    for view, index in chosen[1:]:
+        overlap = float(np.minimum(colors[first], colors[index]).sum())
+        if overlap < ALIKE:
+            lines.append(
+                f"{drawing.name}: figure {index + 1} ({view.name}) shares {100 * overlap:.0f} % of its colours with figure"
+                f" {first + 1} ({first_view.name}), expected {100 * ALIKE:.0f} % or more: are they of one character? Leave it"
+                " out with `-` in --order if not."
+            )
+    return lines
+
+
+def _histogram(canvas: np.ndarray) -> np.ndarray:
+    """How often the figure's colours occur, smoothed, summing to 1."""
+    lab = rgb2lab(canvas[..., :3])[canvas[..., 3] > 0.5]
+    counts, _ = np.histogramdd(lab, bins=(10, 12, 12), range=((0, 100), (-60, 60), (-60, 60)))
+    smooth = ndimage.gaussian_filter(counts, 1.0)
+    return smooth / max(float(smooth.sum()), 1e-9)
+
+
+def _picture(drawing: Drawing, sheet: Sheet, views: Mapping[int, Viewpoint | None]) -> np.ndarray:
+    """The sheet with boxes: figures numbered and named, the rest in grey with why it was left aside."""
+    page = Image.fromarray(bytes_on_white(to_bytes(drawing.rgba)))
+    scale = min(1.0, PICTURE_SIDE / max(page.size))
+    page = page.resize((max(1, round(page.width * scale)), max(1, round(page.height * scale))))
+    draw, font = ImageDraw.Draw(page), ImageFont.load_default(size=14)
+    for aside in sheet.left_aside:
+        box = [scale * edge for edge in aside.box]
+        draw.rectangle(box, outline=ASIDE)
+        draw.text((box[0] + 2, box[1] + 1), aside.reason, fill=ASIDE, font=font)
+    for index, figure in enumerate(sheet.figures):
+        view = views.get(index)
+        box = [scale * edge for edge in figure.box]
+        draw.rectangle(box, outline=FIGURE, width=2)
+        draw.text((box[0] + 4, box[1] + 3), f"{index + 1} {_name(view)}", fill=FIGURE, font=font)
+    return np.asarray(page)
