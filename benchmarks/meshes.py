@@ -20,7 +20,7 @@ def mesh_rows(subject: Subject) -> list[dict[str, Any]]:
     finest = grid_sampler(subject, FINEST, 8)
     level = choose_level(finest.evaluate_coarse(4), subject.views).chosen.level
     truth = extract_surface(finest.evaluate_surface(level), level).mesh
-    cameras = CAMERAS if subject.scene.density_sees_directions else CAMERAS[-1:]
+    cameras = CAMERAS if subject.scene.field.sees_directions else CAMERAS[-1:]
     rows = []
     for resolution in RESOLUTIONS:
         for count in cameras:

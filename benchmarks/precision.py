@@ -12,6 +12,7 @@ import torch
 from charnerf.bench.subjects import Subject
 from charnerf.bench.sweep import Method, rendered_by
 from charnerf.bench.workbench import CULLED, Workbench
+from charnerf.scene import FunctionField
 from charnerf.types import Rendering
 
 
@@ -47,6 +48,6 @@ def _autocast(renderer: Any, subject: Subject) -> Callable[[], Any]:
 
 
 def _compiled(renderer: Any, subject: Subject) -> Callable[[], Any]:
-    field = torch.compile(subject.scene.coarse, dynamic=True)
+    field = FunctionField(torch.compile(subject.scene.coarse.__call__, dynamic=True))
     scene = replace(subject.scene, coarse=field)
     return partial(renderer.render, scene, subject.rays)

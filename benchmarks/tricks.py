@@ -15,9 +15,9 @@ from charnerf.bench.baseline import PixelNeRFLike
 from charnerf.bench.subjects import Subject
 from charnerf.bench.sweep import Method
 from charnerf.bench.workbench import CULLED, Workbench
-from charnerf.geometry.hull import may_hold
 from charnerf.models.lookup import maps_to_rows
-from charnerf.types import FieldOutput, Scene
+from charnerf.scene import FunctionField, Scene
+from charnerf.types import FieldOutput
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
@@ -35,8 +35,9 @@ def variants(bench: Workbench) -> dict[str, Method]:
 
     def without_hull_segments(subject: Subject) -> Callable[[], Any]:
         """Samples over the whole box at the same spacing, packed by the hull all the same."""
-        scene = replace(subject.scene, hull=None, coarse=_masked(subject.scene))
-        side = float((subject.scene.box_max - subject.scene.box_min).amax())
+        bounds = replace(subject.scene.bounds, hull=None, outlines=None)
+        scene = replace(_scene_by(subject, _masked(subject.scene)), bounds=bounds)
+        side = float((bounds.box_max - bounds.box_min).amax())
         count = max(like["num_coarse"], round(side / _spacing(subject, CulledRenderer(**like))))
         renderer = CulledRenderer(**{**like, "num_coarse": count})
         return partial(renderer.render, scene, subject.rays)
@@ -44,17 +45,16 @@ def variants(bench: Workbench) -> dict[str, Method]:
     def by_grid_sample(subject: Subject) -> Callable[[], Any]:
         baseline = PixelNeRFLike(subject.network)
         ask = partial(baseline.evaluate, subject.network.coarse, subject.maps)
-        scene = replace(subject.scene, coarse=ask, fine=None, densities_first=None)
-        return partial(culled.render, scene, subject.rays)
+        return partial(culled.render, _scene_by(subject, ask), subject.rays)
 
     def unhoisted(subject: Subject) -> Callable[[], Any]:
-        scene = replace(subject.scene, coarse=_unhoisted(subject), fine=None, densities_first=None)
-        return partial(culled.render, scene, subject.rays)
+        return partial(culled.render, _scene_by(subject, _unhoisted(subject)), subject.rays)
 
     def huge_chunks(subject: Subject) -> Callable[[], Any]:
         renderer = CulledRenderer(**like)
         renderer.points_at_once = sys.maxsize
-        return partial(renderer.render, replace(subject.scene, bytes_a_point=1), subject.rays)
+        field = FunctionField(subject.scene.coarse, bytes_per_point=1)
+        return partial(renderer.render, replace(subject.scene, coarse=field), subject.rays)
 
     return {
         "all on": on,
@@ -66,11 +66,16 @@ def variants(bench: Workbench) -> dict[str, Method]:
     }
 
 
+def _scene_by(subject: Subject, function: Callable[[Tensor, Tensor], FieldOutput]) -> Scene:
+    """The subject's scene with a field of one pass by a function."""
+    return Scene(FunctionField(function), None, subject.scene.bounds)
+
+
 def _masked(scene: Scene) -> Callable[[Tensor, Tensor], FieldOutput]:
     """The field with the hull applied, evaluated only inside."""
 
     def field(points: Tensor, dirs: Tensor) -> FieldOutput:
-        inside = may_hold(scene, points).nonzero()[:, 0]
+        inside = scene.bounds.may_hold(points).nonzero()[:, 0]
         answer = scene.coarse(points[inside], dirs[inside])
         return FieldOutput(
             rgb=points.new_zeros(points.shape).index_copy(0, inside, answer.rgb),

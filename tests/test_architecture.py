@@ -17,6 +17,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("pictures",),
     ("process",),
     ("geometry",),
+    ("scene",),
     ("config", "losses", "models", "reconciling", "surfaces", "volume"),
     ("data", "meshing", "procedural"),
     ("capture", "evaluation"),

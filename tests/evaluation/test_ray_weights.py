@@ -13,7 +13,9 @@ from charnerf.evaluation.ray_weights import (
     ray_weights,
 )
 from charnerf.evaluation.records import read_record, write_record
-from charnerf.types import FieldOutput, Scene
+from charnerf.geometry.bounds import Bounds
+from charnerf.scene import FunctionField, Scene
+from charnerf.types import FieldOutput
 from charnerf.volume.quadrature.constant import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
 
@@ -28,9 +30,7 @@ def ball_model(density, *, radius=0.6):
         inside = (points - torch.tensor([0.0, 0.0, 0.6])).norm(dim=-1) < radius
         return FieldOutput(rgb=torch.zeros_like(points), densities=density * inside.float())
 
-    scene = Scene(
-        coarse=field, fine=None, hull=None, box_min=BOX[0], box_max=BOX[1], density_sees_directions=False
-    )
+    scene = Scene(FunctionField(field), None, Bounds(*BOX))
     return SimpleNamespace(
         device=torch.device("cpu"), encode=lambda views: views, scene=lambda encoded, index: scene
     )

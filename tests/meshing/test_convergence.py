@@ -15,8 +15,8 @@ from charnerf.meshing.convergence import (
 )
 from charnerf.meshing.options import MeshOptions
 from charnerf.reconstruction.meshes import write_convergence, write_mesh
-from charnerf.types import Scene, SourceViews
-from support.analytic_scenes import figure, scene_of, sphere
+from charnerf.types import SourceViews
+from support.analytic_scenes import figure, scene_of, sphere, with_field
 
 
 def _directed(strength: float):
@@ -27,7 +27,7 @@ def _directed(strength: float):
         answer = plain.field(points, view_dirs)
         return dataclasses.replace(answer, densities=answer.densities * (1.0 + strength * view_dirs[:, 0]))
 
-    return dataclasses.replace(plain, field=field, density_sees_directions=True)
+    return with_field(plain, field, sees_directions=True)
 
 
 def test_without_directions_one_evaluation_is_exact():
@@ -66,8 +66,7 @@ def test_spread_is_the_relative_deviation_over_directions():
 
 
 def test_meshes_come_with_levels_and_cameras_where_asked(tmp_path):
-    made = scene_of(figure, width=0.1)
-    scene = Scene(made.field, None, None, made.box_min, made.box_max, False)
+    scene = scene_of(figure, width=0.1)
     camera = cameras_towards(
         torch.tensor([[0.0, -1.0, 0.0]]),
         target=torch.tensor([0.0, 0.0, 1.0]),

@@ -1,7 +1,5 @@
 """Density grids: averaging, leaving out, and that it costs nothing."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -10,7 +8,7 @@ from charnerf.errors import DataError, NumericalError
 from charnerf.meshing.density_grid import GridSampler, averaged_density, camera_positions
 from charnerf.meshing.extract import extract_surface
 from charnerf.types import FieldOutput
-from support.analytic_scenes import box_hull, figure, scene_of, sphere
+from support.analytic_scenes import box_hull, figure, scene_of, sphere, with_field
 
 
 def _hull_around(distance, margin: float, cells: int = 64):
@@ -45,7 +43,7 @@ def test_left_out_counts_the_points_that_the_field_never_saw():
         seen.append(len(points))
         return field(points, view_dirs)
 
-    scene = dataclasses.replace(scene, field=counting)
+    scene = with_field(scene, counting)
     grid = GridSampler(scene, resolution=64, num_cameras=8).evaluate_surface(60.0)
     assert sum(seen) == grid.left_out.grid_cells_of - grid.left_out.grid_cells
     assert grid.left_out.grid_cells > 0.8 * grid.left_out.grid_cells_of
@@ -59,7 +57,7 @@ def test_outside_the_hull_is_empty_and_never_asked():
     occupancy = torch.zeros(4, 4, 4, dtype=torch.bool)
     occupancy[..., :2] = True  # z < 1
     low, high = torch.tensor([-1.0, -1.0, 0.0]), torch.tensor([1.0, 1.0, 2.0])
-    scene = dataclasses.replace(scene_of(sphere), field=refuses, hull=box_hull(occupancy, low, high))
+    scene = with_field(scene_of(sphere, hull=box_hull(occupancy, low, high)), refuses)
     points = torch.rand(500, 3) * 2 - torch.tensor([1.0, 1.0, 0.0])
     densities = averaged_density(scene, points, 3)
     torch.testing.assert_close(densities, torch.where(points[:, 2] < 1.0, 50.0, 0.0))
@@ -69,7 +67,7 @@ def test_average_over_cameras_is_the_mean_of_their_answers():
     def directed(points, view_dirs):
         return FieldOutput(rgb=torch.ones_like(points), densities=2.0 + view_dirs[:, 0])
 
-    scene = dataclasses.replace(scene_of(sphere), field=directed, density_sees_directions=True)
+    scene = with_field(scene_of(sphere), directed, sees_directions=True)
     points = torch.rand(7, 3)
     offset = points[:, None] - camera_positions(scene, 5)
     expected = 2.0 + (offset / offset.norm(dim=-1, keepdim=True))[..., 0].mean(1)
@@ -77,8 +75,8 @@ def test_average_over_cameras_is_the_mean_of_their_answers():
 
 
 def test_average_of_a_field_without_directions_is_the_field():
-    seeing = scene_of(figure, density_sees_directions=True)
-    blind = scene_of(figure, density_sees_directions=False)
+    seeing = scene_of(figure, sees_directions=True)
+    blind = scene_of(figure, sees_directions=False)
     points = torch.rand(200, 3)
     torch.testing.assert_close(averaged_density(seeing, points, 6), averaged_density(blind, points, 6))
 

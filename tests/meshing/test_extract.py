@@ -1,7 +1,5 @@
 """Surfaces: exactness on a sphere, floaters, decimation, the choice of the level."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -15,7 +13,7 @@ from charnerf.meshing.density_grid import DensityGrid, GridSampler
 from charnerf.meshing.extract import drop_floaters, extract_surface, fit_height, simplify
 from charnerf.meshing.options import MeshOptions
 from charnerf.types import LeftOut, SourceViews
-from support.analytic_scenes import capsule, figure, scene_of, sphere
+from support.analytic_scenes import capsule, figure, scene_of, sphere, with_field
 
 CENTRE = np.array([0.03, -0.07, 1.02])
 
@@ -121,7 +119,7 @@ def test_level_is_where_rendering_sees_the_surface():
             output = field(points, view_dirs)
             return type(output)(output.rgb, output.densities + factor * (figure(points) > -0.1))
 
-        scene = dataclasses.replace(scene, field=with_haze)
+        scene = with_field(scene, with_haze)
         grid = GridSampler(scene, resolution=64, num_cameras=1).evaluate_all()
         choice = choose_level(grid, _views_of(figure))
         assert 2.0 * scale < choice.chosen.level < 100.0 * scale

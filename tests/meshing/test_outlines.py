@@ -11,10 +11,11 @@ from charnerf.meshing.build import build_mesh
 from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import ABOVE, gain_at, raised_rays
+from charnerf.scene import Scene
 from charnerf.surfaces.render import render_mesh
-from charnerf.types import FieldOutput, Scene, SourceViews
+from charnerf.types import FieldOutput, SourceViews
 from support import helpers
-from support.analytic_scenes import capsule, figure, scene_of
+from support.analytic_scenes import capsule, figure, scene_of, with_field
 
 LEVEL = 20.0
 
@@ -32,7 +33,7 @@ def scene(hazy: float | None = None) -> Scene:
         depth = hazy * (1.0 - points[:, 1].abs())
         return replace(found, densities=torch.where(points[:, 0] > 0.4, haze * depth, found.densities))
 
-    return Scene(field, None, None, whole.box_min, whole.box_max, density_sees_directions=False)
+    return with_field(whole, field)
 
 
 @pytest.fixture(scope="module")

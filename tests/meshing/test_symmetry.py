@@ -11,8 +11,8 @@ from charnerf.meshing.density_grid import GridSampler, averaged_density
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.extract import extract_surface
 from charnerf.meshing.symmetry import symmetric_hull, symmetric_scene
-from charnerf.types import Scene
-from support.analytic_scenes import box_hull, capsule, figure, scene_of
+from charnerf.scene import Scene
+from support.analytic_scenes import box_hull, capsule, figure, scene_of, with_field
 
 
 def _lopsided(points: torch.Tensor) -> torch.Tensor:
@@ -20,8 +20,7 @@ def _lopsided(points: torch.Tensor) -> torch.Tensor:
 
 
 def _scene(shape=_lopsided, hull=None) -> Scene:
-    made = scene_of(shape, width=0.1)
-    return Scene(made.field, None, hull, made.box_min, made.box_max, False)
+    return scene_of(shape, width=0.1, hull=hull)
 
 
 def _hull(shape, low=(-1.0, -0.9, -0.1), high=(1.35, 0.9, 2.2), cells=40):
@@ -74,10 +73,10 @@ def test_colours_stay_on_their_side():
         )
         return dataclasses.replace(answer, rgb=rgb)
 
-    made = symmetric_scene(dataclasses.replace(plain, coarse=badged))
+    made = symmetric_scene(with_field(plain, badged))
     points = torch.tensor([[0.1, 0.0, 1.2], [-0.1, 0.0, 1.2]])
-    answer = made.answer_densities(points, torch.zeros(2, 3))
-    rgb = answer.colours(answer.state)
+    answer = made.field.densities(points, torch.zeros(2, 3))
+    rgb = made.field.colors(answer.state)
     assert rgb[0, 0] > 0.98 and rgb[1, 2] > 0.98
 
 
@@ -93,7 +92,9 @@ def test_the_hull_holds_both_sides():
 
 
 def test_outlines_hold_where_either_side_does():
-    left_only = dataclasses.replace(_scene(), in_outlines=lambda points: points[:, 0] > 0.5)
+    scene = _scene()
+    bounds = dataclasses.replace(scene.bounds, outlines=lambda points: points[:, 0] > 0.5)
+    left_only = dataclasses.replace(scene, bounds=bounds)
     points = torch.tensor(((0.7, 0.0, 1.0), (-0.7, 0.0, 1.0), (0.2, 0.0, 1.0)))
-    assert symmetric_scene(left_only).in_outlines(points).tolist() == [True, True, False]
-    assert symmetric_scene(_scene()).in_outlines is None
+    assert symmetric_scene(left_only).bounds.outlines(points).tolist() == [True, True, False]
+    assert symmetric_scene(scene).bounds.outlines is None

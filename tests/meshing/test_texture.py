@@ -16,7 +16,7 @@ from charnerf.meshing.parts import parts_of, read_texture, texture_picture, weld
 from charnerf.meshing.projection import Projector
 from charnerf.meshing.texture import padded_picture, texture_mesh
 from charnerf.types import SourceViews
-from support.analytic_scenes import scene_of, sphere
+from support.analytic_scenes import scene_of, sphere, with_field
 
 MAGENTA = (1.0, 0.0, 1.0)
 FRONT, SIDE, BACK = (0.8, 0.2, 0.1), (0.1, 0.7, 0.2), (0.2, 0.3, 0.9)
@@ -61,7 +61,7 @@ def _grey_scene():
         answer = scene.field(points, view_dirs)
         return replace(answer, rgb=torch.full_like(points, 0.5))
 
-    return replace(scene, field=field)
+    return with_field(scene, field)
 
 
 def _colour_at(mesh: trimesh.Trimesh, directions) -> np.ndarray:

@@ -9,7 +9,7 @@ from torch.nn import functional as F
 from charnerf.data.mixed import stack_hulls, stack_views
 from charnerf.errors import ShapeError
 from charnerf.geometry.cameras import project_into_all
-from charnerf.geometry.hull import hull_contains, may_hold
+from charnerf.geometry.hull import hull_contains
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.lookup import bilinear_rows, maps_to_rows, read_rows
 from charnerf.types import FieldOutput, Hull, SourceViews
@@ -141,7 +141,7 @@ def test_every_parameter_gets_a_gradient(fine, density, person_views, person_hul
     silent = [n for n, p in model.named_parameters() if p.grad is None or not p.grad.abs().sum() > 0]
     silent = [name for name in silent if "score.bias" not in name]  # a softmax does not see what all share
     assert silent == []
-    assert (scene.fine is None) != fine and scene.density_sees_directions == (density == "view_dependent")
+    assert (scene.fine is None) != fine and scene.field.sees_directions == (density == "view_dependent")
 
 
 def test_coarse_and_fine_share_the_encoder_and_nothing_else():
@@ -154,7 +154,7 @@ def test_a_model_without_hull_carves_nothing(person_views):
     model = tiny_models.tiny_model(hull=False)
     assert model.carve(person_views) is None
     encoded = model.encode(person_views)
-    assert encoded.hull is None and model.scene(encoded, 0).hull is None
+    assert encoded.hull is None and model.scene(encoded, 0).bounds.hull is None
 
 
 def coverage_at(views: SourceViews, points: torch.Tensor) -> torch.Tensor:
@@ -185,9 +185,9 @@ def test_what_lies_beside_the_outlines_is_not_asked(person_views):
     model = tiny_models.shake(tiny_models.tiny_model(views="mirrored")).eval()
     scene = model.scene(model.encode(person_views), 0)
     points = some_points(4000)
-    held = may_hold(scene, points)
+    held = scene.bounds.may_hold(points)
     densities = scene.field(points, torch.zeros_like(points)).densities
-    in_hull = hull_contains(scene.hull, points)
+    in_hull = hull_contains(scene.bounds.hull, points)
     assert bool((densities[in_hull & ~held] == 0.0).all()) and bool((in_hull & ~held).any())
     settings = {
         "quadrature": PiecewiseConstant(),
@@ -199,12 +199,12 @@ def test_what_lies_beside_the_outlines_is_not_asked(person_views):
     camera = helpers.target_cameras(3, size=24)[1]
     for renderer in (CulledRenderer(**settings), AdaptiveRenderer(**settings, tolerance=0.01)):
         found = renderer.render_camera(scene, camera)
-        asked = renderer.render_camera(replace(scene, in_outlines=None), camera)
+        asked = renderer.render_camera(replace(scene, bounds=replace(scene.bounds, outlines=None)), camera)
         torch.testing.assert_close(found.finest.rgb, asked.finest.rgb, rtol=0.0, atol=1e-5)
         torch.testing.assert_close(found.finest.opacity, asked.finest.opacity, rtol=0.0, atol=1e-5)
         assert found.left_out.samples > asked.left_out.samples
     assert (
-        model.train().scene(model.encode(person_views), 0).in_outlines is None
+        model.train().scene(model.encode(person_views), 0).bounds.outlines is None
     )  # what trains learns them itself
 
 

@@ -56,8 +56,8 @@ def test_some_points_are_coloured_as_they_are_among_all(model):
     with torch.no_grad():
         scene = model.scene(model.encode(striped(SMALL), detailed=striped(LARGE)), 0).at_width(LARGE)
         at_once = scene.field(points, dirs)
-        answer = scene.densities_first(points, dirs)
-        some = answer.colours(answer.state[::3])
+        answer = scene.field.densities(points, dirs)
+        some = scene.field.colors(answer.state[::3])
     torch.testing.assert_close(answer.densities, at_once.densities)
     torch.testing.assert_close(some, at_once.rgb[::3])
 

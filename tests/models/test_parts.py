@@ -37,7 +37,7 @@ def point_inputs(num_points: int = 9, num_views: int = 3, *, point_features: int
         latents=random(num_points, num_views, WIDTH),
         point_features=random(num_points, num_views, point_features),
         source_rgb=torch.rand(num_points, num_views, 3, dtype=torch.float64),
-        shares=torch.rand(num_points, num_views, 2, dtype=torch.float64),
+        uv=torch.rand(num_points, num_views, 2, dtype=torch.float64),
         visibility=torch.rand(num_points, num_views, dtype=torch.float64),
         valid=torch.rand(num_points, num_views) < 0.6,
         encoded_points=random(num_points, 6 * tiny_models.FREQUENCIES),

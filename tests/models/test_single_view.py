@@ -25,7 +25,7 @@ def inputs_of(
         latents=random(count, views, f1.latent_size),
         point_features=random(count, views, point_features),
         source_rgb=random(count, views, 3),
-        shares=torch.rand(count, views, 2, dtype=torch.float64),
+        uv=torch.rand(count, views, 2, dtype=torch.float64),
         visibility=random(count, views),
         valid=torch.ones(count, views, dtype=torch.bool),
         encoded_points=f1.locate(points, rotations),

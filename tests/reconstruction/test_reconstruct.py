@@ -14,13 +14,15 @@ from PIL import Image, ImageDraw
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import DataError, NumericalError
+from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.hull import build_hull
 from charnerf.inference.hero import Hero
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.parts import read_texture
 from charnerf.reconstruction.folder import reconstruct
 from charnerf.reconstruction.options import ReconstructionOptions
-from charnerf.types import FieldOutput, Scene
+from charnerf.scene import FunctionField, Scene
+from charnerf.types import FieldOutput
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.culled import CulledRenderer
 
@@ -56,7 +58,7 @@ class FakeModel:
         renderer = CulledRenderer(
             quadrature=PiecewiseConstant(), num_coarse=24, num_fine=0, hull_steps=64, memory_mib=64
         )
-        return Hero(Scene(field, None, hull, *BOX, False), read.views, renderer, read)
+        return Hero(Scene(FunctionField(field), None, Bounds(*BOX, hull)), read.views, renderer, read)
 
 
 @pytest.fixture

@@ -1,28 +1,22 @@
 """Fields with known surfaces, in place of a trained model."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
+from charnerf.geometry.bounds import Bounds
+from charnerf.scene import FunctionField, Scene
 from charnerf.types import FieldOutput, Hull
 
+BOX = torch.tensor([-1.4, -1.4, -0.4]), torch.tensor([1.4, 1.4, 2.4])
 
-@dataclass(frozen=True)
-class AnalyticScene:
-    """The scene that meshing expects of a model: a field, its hull and its box."""
 
-    field: Callable[[Tensor, Tensor], FieldOutput]
-    hull: Hull | None
-    box_min: Tensor
-    box_max: Tensor
-    density_sees_directions: bool = False
-    in_outlines: None = None
-
-    def answer_densities(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
-        """All at once: the colours beside are not read."""
-        return self.field(points, view_dirs)
+def with_field(
+    scene: Scene, function: Callable[[Tensor, Tensor], FieldOutput], *, sees_directions: bool = False
+) -> Scene:
+    """The scene with another field, of one pass."""
+    return Scene(FunctionField(function, sees_directions), None, scene.bounds)
 
 
 def box_hull(occupancy: Tensor, low: Tensor, high: Tensor) -> Hull:
@@ -32,8 +26,13 @@ def box_hull(occupancy: Tensor, low: Tensor, high: Tensor) -> Hull:
 
 
 def scene_of(
-    distance: Callable[[Tensor], Tensor], *, width: float = 0.03, peak: float = 200.0, **options
-) -> AnalyticScene:
+    distance: Callable[[Tensor], Tensor],
+    *,
+    width: float = 0.03,
+    peak: float = 200.0,
+    hull: Hull | None = None,
+    sees_directions: bool = False,
+) -> Scene:
     """Density peak / 2 where a signed distance (positive inside) is zero, smooth over a width."""
 
     def field(points: Tensor, view_dirs: Tensor) -> FieldOutput:
@@ -41,12 +40,7 @@ def scene_of(
         rgb[:, 2] = torch.where(points[:, 1] < 0, 0.9, 0.1)  # blue in front
         return FieldOutput(rgb=rgb, densities=peak * torch.sigmoid(distance(points) * (4.0 / width)))
 
-    defaults = {
-        "hull": None,
-        "box_min": torch.tensor([-1.4, -1.4, -0.4]),
-        "box_max": torch.tensor([1.4, 1.4, 2.4]),
-    }
-    return AnalyticScene(field, **{**defaults, **options})
+    return Scene(FunctionField(field, sees_directions), None, Bounds(*BOX, hull))
 
 
 def sphere(points: Tensor, *, centre=(0.03, -0.07, 1.02), radius: float = 1.0) -> Tensor:

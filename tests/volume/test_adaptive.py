@@ -7,8 +7,10 @@ from dataclasses import replace
 import pytest
 import torch
 
+from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.types import DensityAnswer, FieldOutput, Hull, RayBundle, Scene
+from charnerf.scene import AbstractField, FunctionField, Scene
+from charnerf.types import FieldOutput, Hull, RayBundle
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -34,9 +36,7 @@ def rays_of(camera: int = 2, size: int = 14) -> RayBundle:
 
 
 def scene_of(field: Field, hull: Hull | None = None) -> Scene:
-    return Scene(
-        coarse=field, fine=None, hull=hull, box_min=BOX[0], box_max=BOX[1], density_sees_directions=False
-    )
+    return Scene(FunctionField(field), None, Bounds(*BOX, hull))
 
 
 def striped(points: torch.Tensor) -> torch.Tensor:
@@ -97,24 +97,26 @@ def test_a_tighter_tolerance_costs_more_and_errs_less():
 
 def test_what_nobody_sees_is_not_evaluated():
     """Behind an opaque front, and colours where there is no weight."""
+    ball = FIELDS["ball with a soft surface"]
     deepest = 0.0
     asked = 0
 
-    def answer(points: torch.Tensor, dirs: torch.Tensor) -> DensityAnswer:
-        nonlocal deepest
-        deepest = max(deepest, float(points[:, 1].max()))
-        found = FIELDS["ball with a soft surface"](points, dirs)
+    class Counting(AbstractField):
+        sees_directions = False
 
-        def colours(part: FieldOutput) -> torch.Tensor:
+        def __call__(self, points: torch.Tensor, dirs: torch.Tensor) -> FieldOutput:
+            nonlocal deepest
+            deepest = max(deepest, float(points[:, 1].max()))
+            return ball(points, dirs)
+
+        def colors(self, state: FieldOutput) -> torch.Tensor:
             nonlocal asked
-            asked += len(part.rgb)
-            return part.rgb
-
-        return DensityAnswer(densities=found.densities, state=found, colours=colours)
+            asked += len(state.rgb)
+            return state.rgb
 
     camera = helpers.source_cameras((0.0,), size=10)[0]  # looks along +y
     rays = pixel_rays(camera, torch.full((64, 2), 5.0))
-    scene = replace(scene_of(FIELDS["ball with a soft surface"]), densities_first=answer)
+    scene = replace(scene_of(ball), coarse=Counting())
     with torch.no_grad():
         rendering = adaptive().render(scene, rays)
     assert rendering.estimate is not None

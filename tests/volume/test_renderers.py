@@ -6,9 +6,11 @@ from dataclasses import replace
 import pytest
 import torch
 
+from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import hull_contains
-from charnerf.types import FieldOutput, Hull, RayBundle, Scene
+from charnerf.scene import FunctionField, Scene
+from charnerf.types import FieldOutput, Hull, RayBundle
 from charnerf.volume.quadrature import PiecewiseConstant, PiecewiseLinear
 from charnerf.volume.renderers.base import AbstractRenderer, chunk_size
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -46,9 +48,7 @@ def fog(density: float) -> Callable[..., FieldOutput]:
 
 
 def scene_of(coarse, fine=None, hull: Hull | None = None) -> Scene:
-    return Scene(
-        coarse=coarse, fine=fine, hull=hull, box_min=BOX[0], box_max=BOX[1], density_sees_directions=False
-    )
+    return Scene(FunctionField(coarse), None if fine is None else FunctionField(fine), Bounds(*BOX, hull))
 
 
 def box_hull(low: tuple[float, ...], high: tuple[float, ...]) -> Hull:
@@ -120,10 +120,11 @@ def test_chunks_change_nothing(person_scene, kind):
         return scene.coarse(points, dirs)
 
     rays = rays_of(size=16)
+    coarse = FunctionField(counted, bytes_per_point=scene.coarse.bytes_per_point)
     with torch.no_grad():
         whole = renderer(kind, memory_mib=1024).render(scene, rays)
-        pieces = renderer(kind, memory_mib=1).render(replace(scene, coarse=counted), rays)
-    assert len(sizes) > 1 and max(sizes) <= chunk_size(1, scene.bytes_a_point)
+        pieces = renderer(kind, memory_mib=1).render(replace(scene, coarse=coarse), rays)
+    assert len(sizes) > 1 and max(sizes) <= chunk_size(1, scene.coarse.bytes_per_point)
     for name in ("rgb", "opacity", "depth"):
         torch.testing.assert_close(
             getattr(pieces.finest, name), getattr(whole.finest, name), atol=1e-5, rtol=1e-5
@@ -166,11 +167,11 @@ def test_what_is_left_out_is_counted_right(person_scene):
 
     def counting(field):
         def answer(points, dirs):
-            assert hull_contains(scene.hull, points).all()
+            assert hull_contains(scene.bounds.hull, points).all()
             evaluated.append(len(points))
             return field(points, dirs)
 
-        return answer
+        return FunctionField(answer)
 
     counted = replace(scene, coarse=counting(scene.coarse), fine=counting(scene.fine))
     rays = rays_of(size=16)
@@ -291,7 +292,7 @@ def test_the_same_generator_gives_the_same_samples():
 
 def test_float64():
     rays = rays_of().to(torch.float64)
-    scene = replace(scene_of(ball_field(3.0)), box_min=BOX[0].double(), box_max=BOX[1].double())
+    scene = replace(scene_of(ball_field(3.0)), bounds=Bounds(BOX[0].double(), BOX[1].double()))
     found = renderer(num_coarse=64).render(scene, rays).finest
     single = renderer(num_coarse=64).render(scene_of(ball_field(3.0)), rays_of()).finest
     assert found.rgb.dtype == torch.float64

@@ -146,7 +146,7 @@ class PixelNeRFLike:
                 latents=latents,
                 point_features=network.features(readings),
                 source_rgb=source_rgb,
-                shares=(pixels / size).transpose(0, 1),
+                uv=(pixels / size).transpose(0, 1),
                 visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
                 valid=valid,
                 encoded_points=encoded,

@@ -20,7 +20,8 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.models.charnerf import CharNeRF
 from charnerf.procedural import make_character
-from charnerf.types import Cameras, RayBundle, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import Cameras, RayBundle, SourceViews
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.dense import DenseRenderer
 

@@ -18,7 +18,8 @@ from charnerf.geometry.framing import framing_camera
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.combinators.base import masked_logits, view_weights
 from charnerf.models.combinators.view_attention import AttentionLogits, ViewAttention
-from charnerf.types import Cameras, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import Cameras, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 ATTENTION_FILE = "attention.json"

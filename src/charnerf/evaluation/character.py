@@ -23,7 +23,8 @@ from charnerf.evaluation.surface_error import missing_surface, surface_scores, t
 from charnerf.evaluation.timing import Stopwatch
 from charnerf.meshing.build import BuiltMesh
 from charnerf.models.charnerf import CharNeRF
-from charnerf.types import LeftOut, RenderOutput, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import LeftOut, RenderOutput, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 OURS = "ours"

@@ -17,8 +17,9 @@ from charnerf.markdown import table
 from charnerf.meshing.build import find_surface, finish_mesh
 from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.pictures import on_white
+from charnerf.scene import Scene
 from charnerf.surfaces.render import render_mesh
-from charnerf.types import Cameras, Scene
+from charnerf.types import Cameras
 
 KINDS: tuple[Texture, ...] = ("drawings", "field", "vertex")
 WHOLE = 0.99  # alpha from which a pixel shows the character alone

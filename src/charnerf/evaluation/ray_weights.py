@@ -16,13 +16,13 @@ from charnerf.data.characters import Character
 from charnerf.errors import DataError
 from charnerf.evaluation.frames import fixed_views
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import stratified_t_vals
 from charnerf.models.charnerf import CharNeRF
+from charnerf.scene import Scene
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.raycast import RayCaster
-from charnerf.types import RayBundle, Scene, TensorRecord
+from charnerf.types import RayBundle, TensorRecord
 from charnerf.volume.compositing import expected_depth, weights_from_densities
 from charnerf.volume.renderers.base import AbstractRenderer
 
@@ -220,7 +220,7 @@ def _measured(
         entropy=normalised_entropy(weights),
         depth=expected_depth(weights, t_vals, seen.t_edges[:, -1][opaque]),
         truth=truth,
-        hull=entry if scene.hull is not None else torch.full_like(entry, torch.nan),
+        hull=entry if scene.bounds.hull is not None else torch.full_like(entry, torch.nan),
         histogram=_histogram(weights, t_vals - truth[:, None]),
     )
 
@@ -228,10 +228,10 @@ def _measured(
 def _densities(scene: Scene, points: Tensor, dirs: Tensor) -> Tensor:
     """Densities of the finest field at samples (R, S, 3), zero outside the hull."""
     flat, towards = points.reshape(-1, 3), dirs.reshape(-1, 3)
-    packed = may_hold(scene, flat).nonzero()[:, 0]
+    packed = scene.bounds.may_hold(flat).nonzero()[:, 0]
     densities = flat.new_zeros(len(flat))
     for part in packed.split(_POINTS_AT_ONCE):
-        densities[part] = scene.answer_densities(flat[part], towards[part]).densities.to(densities.dtype)
+        densities[part] = scene.field.densities(flat[part], towards[part]).densities.to(densities.dtype)
     return densities.reshape(points.shape[:-1])
 
 

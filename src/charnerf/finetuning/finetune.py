@@ -111,8 +111,8 @@ def finetune(
     start = time.perf_counter()
     network = copy.deepcopy(model.network).requires_grad_(False).eval()
     with torch.no_grad():
-        hull = None if hero.scene.hull is None else hero.scene.hull[None]
-        encoded = network.encode(hero.views, hull, detailed=hero.detailed)
+        hull = hero.scene.bounds.hull
+        encoded = network.encode(hero.views, None if hull is None else hull[None], detailed=hero.detailed)
         scene = network.scene(encoded, 0)
         material = gather(network, model.renderer, encoded, scene, hero.views, hero.radius(), recipe)
     if not len(material.learnt) or not len(material.held_out):

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from charnerf.geometry.hull import may_hold
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, merge_t_vals, stratified_t_vals
 from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.models.field import Field
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
-from charnerf.types import FieldOutput, RayBundle, Scene, TensorRecord
+from charnerf.scene import Scene
+from charnerf.types import FieldOutput, RayBundle, TensorRecord
 from charnerf.volume.compositing import composite
 from charnerf.volume.renderers.base import POINTS_AT_ONCE, WHITE, AbstractRenderer
 
@@ -107,7 +107,7 @@ def place(
 def _look(scene: Scene, rays: RayBundle, t_vals: Tensor) -> tuple[Tensor, Tensor]:
     """Points (R, S, 3) along rays, and which a density may be at (R, S)."""
     points = points_along(rays, t_vals)
-    return points, may_hold(scene, points)
+    return points, scene.bounds.may_hold(points)
 
 
 def _in_chunks(function: Callable[[Tensor, Tensor], Tensor], points: Tensor, dirs: Tensor) -> Tensor:

@@ -18,7 +18,8 @@ from charnerf.geometry.cameras import (
 )
 from charnerf.geometry.framing import camera_distance
 from charnerf.models.charnerf import CharNeRF, EncodedViews
-from charnerf.types import Cameras, LeftOut, RayBundle, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import Cameras, LeftOut, RayBundle, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 NOVEL_CAMERAS = 16  # half of them are for the guard
@@ -146,7 +147,7 @@ def _novel_cameras(scene: Scene, radius: float, generator: torch.Generator) -> t
     ]
     cameras = cameras_towards(
         direction_from_angles(azimuths, elevations),
-        target=(0.5 * (scene.box_min + scene.box_max)).double().cpu(),
+        target=(0.5 * (scene.bounds.box_min + scene.bounds.box_max)).double().cpu(),
         distance=camera_distance(radius),
         half_extent=radius,
         size=NOVEL_SIZE,
@@ -166,7 +167,7 @@ def _answered(
     generator: torch.Generator,
 ) -> Targets:
     """Up to `count` rays of cameras that meet the hull, with the answers of the network as it is."""
-    device = scene.box_min.device
+    device = scene.bounds.box_min.device
     cameras, pixels = cameras.to(device), pixel_centres(cameras.width, cameras.height).reshape(-1, 2)
     some = -(-TRIED * count // cameras.shape[0])
     rays = RayBundle.joined(

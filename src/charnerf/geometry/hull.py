@@ -14,7 +14,7 @@ from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all
 from charnerf.geometry.occupied import POOL, RAYS_AT_ONCE, candidates, coarse_occupancy, occupied_at
 from charnerf.geometry.rays import box_interval
-from charnerf.types import Cameras, Hull, RayBundle, Scene, SourceViews
+from charnerf.types import Cameras, Hull, RayBundle, SourceViews
 
 log = logging.getLogger(__name__)
 
@@ -73,18 +73,6 @@ def hull_contains(hull: Hull, points: Tensor) -> Tensor:
     index = scaled.clamp(0, cells - 1).long()
     flat = (index[..., 0] * cells + index[..., 1]) * cells + index[..., 2]
     return inside & hull.occupancy.reshape(-1)[flat]
-
-
-def may_hold(scene: Scene, points: Tensor) -> Tensor:
-    """Whether a scene may have a density at points (..., 3), (...) bool: elsewhere it is zero and need not be asked."""
-    if scene.hull is None:
-        held = torch.ones_like(points[..., 0], dtype=torch.bool)
-    else:
-        held = hull_contains(scene.hull, points)
-    if scene.in_outlines is not None:
-        index = held.nonzero(as_tuple=True)
-        held[index] = scene.in_outlines(points[index])
-    return held
 
 
 def occupied_edges(

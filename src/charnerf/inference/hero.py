@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -17,7 +17,8 @@ from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.lod import Lod, build_lods
 from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.meshing.symmetry import symmetric_scene
-from charnerf.types import Cameras, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import Cameras, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class Hero:
     renderer: AbstractRenderer
     turnaround: Turnaround | None = None
     detailed: SourceViews | None = None
+    _scene_by_width: dict[int, Scene] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def render(self, *, azimuth_deg: float, elevation_deg: float = 0.0, size: int = 256) -> np.ndarray:
         """Render a view, coloured from the drawings at the picture's resolution as far as they have it.
@@ -139,9 +141,10 @@ class Hero:
 
     def radius(self) -> float:
         """Radius around (0, 0, 1) that pictures frame, m: of the hull with a margin, at least 1.05 m."""
-        hull, box_min = self.scene.hull, self.scene.box_min
+        bounds = self.scene.bounds
+        hull, box_min = bounds.hull, bounds.box_min
         if hull is None:
-            return float((self.scene.box_max - box_min).amax()) / 2.0
+            return float((bounds.box_max - box_min).amax()) / 2.0
         occupied = hull.occupancy.nonzero()
         if len(occupied) == 0:
             return framing_radius(0.0)
@@ -151,15 +154,17 @@ class Hero:
 
     def _scene_for(self, size: int) -> Scene:
         """The scene for pictures of a size: a pixel of theirs covers as much as one of the drawings that it reads."""
-        if self.scene.at_width is None:
-            return self.scene
         cameras = self.views.cameras[self.views.present]
         distance = (cameras.world_from_camera[:, :3, 3] - cameras.focal.new_tensor(CENTRE)).norm(dim=-1)
         metres = torch.where(cameras.orthographic, 1.0, distance) / cameras.focal[:, 0]  # that a pixel covers
         across = cameras.width * float(metres.amax())
-        return self.scene.at_width(math.ceil(size * across / (2.0 * self.radius())))
+        width = math.ceil(size * across / (2.0 * self.radius()))
+        if width not in self._scene_by_width:
+            self._scene_by_width.clear()  # the pictures of a turntable are of one size
+            self._scene_by_width[width] = self.scene.at_width(width)
+        return self._scene_by_width[width]
 
     def _camera(self, azimuth_deg: float, elevation_deg: float, size: int) -> Cameras:
         """Pinhole camera of shape () that frames the character."""
         camera = framing_camera(azimuth_deg, elevation_deg, radius=self.radius(), size=size)
-        return camera.to(self.scene.box_min.device)
+        return camera.to(self.scene.bounds.box_min.device)

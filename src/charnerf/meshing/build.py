@@ -17,7 +17,8 @@ from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import gain_at, raised_rays
 from charnerf.meshing.smooth import smooth_mesh
 from charnerf.meshing.texture import Textured, texture_mesh
-from charnerf.types import LeftOut, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import LeftOut, SourceViews
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import trimesh
 
 from charnerf.errors import NumericalError
 from charnerf.meshing.density_grid import CHUNK
-from charnerf.types import Scene
+from charnerf.scene import Scene
 
 
 @torch.no_grad()
@@ -26,7 +26,7 @@ def field_colours(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.n
     Raises:
         NumericalError: If the field answers NaN or infinity.
     """
-    device = scene.box_min.device
+    device = scene.bounds.box_min.device
     where = torch.tensor(np.asarray(points), dtype=torch.float32, device=device)
     outward = torch.tensor(np.asarray(normals), dtype=torch.float32, device=device)
     parts = zip(where.split(CHUNK), outward.split(CHUNK), strict=True)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 import torch
 import trimesh
+from torch import Tensor
 
 from charnerf.geometry.safe import safe_normalize
 from charnerf.markdown import table
@@ -16,7 +18,8 @@ from charnerf.meshing.calibrate import choose_level
 from charnerf.meshing.density_grid import GridSampler, camera_positions
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.extract import extract_surface
-from charnerf.types import Scene, SourceViews
+from charnerf.scene import AbstractField, DensityOutput, Scene
+from charnerf.types import FieldOutput, SourceViews, TensorRecord
 
 COUNTS = (1, 2, 4, 8, 16)
 PROBES = 2_000  # points near the surface where directions are compared
@@ -103,22 +106,39 @@ def measure_convergence(
         level: Density of the surfaces, 1/m; None chooses it with the most cameras. The same for all, since
             its effect is larger than that of the cameras.
     """
-    most = 1 if not scene.density_sees_directions else max(counts)
+    most = 1 if not scene.field.sees_directions else max(counts)
     if level is None:
         sampler = GridSampler(scene, resolution=resolution, num_cameras=most)
         level = choose_level(sampler.evaluate_coarse(2), views).chosen.level
     reference, _ = _surface(scene, resolution, most, level)
     spread = direction_spread(scene, np.asarray(reference.vertices))
-    if not scene.density_sees_directions:
+    if not scene.field.sees_directions:
         return Convergence((), level, spread, True)
     rows = []
     for count in (0, *sorted(counts)):
-        # without a direction of its own the averaging asks with the zero direction, once
-        asked = replace(scene, density_sees_directions=False) if count == 0 else scene
-        mesh, seconds = _surface(asked, resolution, max(count, 1), level)
+        seen = scene if count else Scene(_Undirected(scene.field), None, scene.bounds)
+        mesh, seconds = _surface(seen, resolution, max(count, 1), level)
         distance = surface_chamfer_mm(mesh, reference)
         rows.append(ConvergenceRow(count, distance, float(mesh.volume), len(mesh.faces), seconds))
     return Convergence(tuple(rows), level, spread, False)
+
+
+@final
+@dataclass(frozen=True)
+class _Undirected(AbstractField):
+    """A field whose averaging asks with the zero direction, once."""
+
+    inner: AbstractField
+    sees_directions: bool = False
+
+    def __call__(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
+        return self.inner(points, view_dirs)
+
+    def densities(self, points: Tensor, view_dirs: Tensor) -> DensityOutput:
+        return self.inner.densities(points, view_dirs)
+
+    def colors(self, state: TensorRecord) -> Tensor:
+        return self.inner.colors(state)
 
 
 def _surface(scene: Scene, resolution: int, cameras: int, level: float) -> tuple[trimesh.Trimesh, float]:
@@ -132,10 +152,10 @@ def _surface(scene: Scene, resolution: int, cameras: int, level: float) -> tuple
 def direction_spread(scene: Scene, near: np.ndarray) -> float:
     """Standard deviation of the density over directions by its mean, averaged over points (P, 3), m."""
     chosen = near[:: max(1, len(near) // PROBES)].astype(np.float32)
-    points = torch.from_numpy(chosen).to(scene.box_min.device)
+    points = torch.from_numpy(chosen).to(scene.bounds.box_min.device)
     answers = torch.stack(
         [
-            scene.answer_densities(points, safe_normalize(points - position)).densities.double()
+            scene.field.densities(points, safe_normalize(points - position)).densities.double()
             for position in camera_positions(scene, DIRECTIONS).to(points)
         ]
     )

@@ -19,9 +19,9 @@ from torch.nn import functional as F
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import fibonacci_hemisphere
 from charnerf.geometry.framing import LEAST_DISTANCE
-from charnerf.geometry.hull import may_hold
 from charnerf.geometry.safe import safe_normalize
-from charnerf.types import LeftOut, Scene
+from charnerf.scene import Scene
+from charnerf.types import LeftOut
 
 BLOCK = 4  # cells a side
 CHUNK = 8192  # points evaluated at once; larger batches leave the caches
@@ -70,10 +70,10 @@ class DensityGrid:
 
 def densities_inside(scene: Scene, points: Tensor, *view_dirs: Tensor) -> Tensor:
     """Densities (P,), 1/m, of points (P, 3): the mean over view_dirs, (P, 3) each; zero outside the hull, unevaluated."""
-    inside = may_hold(scene, points).nonzero()[:, 0]
+    inside = scene.bounds.may_hold(points).nonzero()[:, 0]
     densities = points.new_zeros(len(points))
     for part in inside.split(CHUNK):
-        answers = [scene.answer_densities(points[part], dirs[part]).densities for dirs in view_dirs]
+        answers = [scene.field.densities(points[part], dirs[part]).densities for dirs in view_dirs]
         densities[part] = torch.stack(answers).mean(0)
     return densities
 
@@ -96,7 +96,7 @@ def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
     Source: paper, Mesh Reconstruction (several cameras, averaged, instead of the zero direction).
     """
     view_dirs = [torch.zeros_like(points)]
-    if scene.density_sees_directions:
+    if scene.field.sees_directions:
         positions = camera_positions(scene, num_cameras).to(points)
         view_dirs = [safe_normalize(points - position) for position in positions]
     densities = densities_inside(scene, points, *view_dirs)
@@ -114,7 +114,7 @@ def camera_positions(scene: Scene, num_cameras: int) -> Tensor:
     """Where the averaged cameras stand, (N, 3), m."""
     if num_cameras < 1:
         raise DataError(f"num_cameras: found {num_cameras}, expected at least 1.")
-    centre = 0.5 * (scene.box_min + scene.box_max)
+    centre = 0.5 * (scene.bounds.box_min + scene.bounds.box_max)
     return centre + LEAST_DISTANCE * fibonacci_hemisphere(num_cameras).to(centre)
 
 
@@ -164,7 +164,7 @@ class GridSampler:
     def _points(self, index: np.ndarray) -> Tensor:
         """World positions (P, 3) of grid points by index (P, 3)."""
         return torch.from_numpy((self.origin + index * self.spacing).astype(np.float32)).to(
-            self._scene.box_min.device
+            self._scene.bounds.box_min.device
         )
 
     def _inside(self) -> np.ndarray:
@@ -174,7 +174,7 @@ class GridSampler:
         for x in range(1, self.shape[0] - 1):
             layer = np.argwhere(inside[x])
             index = np.concatenate((np.full((len(layer), 1), x), layer), axis=1)
-            inside[x][inside[x]] = may_hold(self._scene, self._points(index)).cpu().numpy()
+            inside[x][inside[x]] = self._scene.bounds.may_hold(self._points(index)).cpu().numpy()
         return inside
 
     @torch.no_grad()
@@ -272,7 +272,7 @@ class GridSampler:
     @torch.no_grad()
     def density_at(self, points: np.ndarray) -> np.ndarray:
         """Averaged density (P,), 1/m, at any points (P, 3), m."""
-        tensor = torch.from_numpy(points.astype(np.float32)).to(self._scene.box_min.device)
+        tensor = torch.from_numpy(points.astype(np.float32)).to(self._scene.bounds.box_min.device)
         self._on_points(len(points))
         return self._densities(tensor).double().cpu().numpy()
 
@@ -286,9 +286,10 @@ class GridSampler:
 
 def _occupied_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the part of the box that can carry density, (3,) float64 each, m."""
-    if scene.hull is None:
-        return scene.box_min.double().cpu().numpy(), scene.box_max.double().cpu().numpy()
-    hull = scene.hull
+    bounds = scene.bounds
+    hull = bounds.hull
+    if hull is None:
+        return bounds.box_min.double().cpu().numpy(), bounds.box_max.double().cpu().numpy()
     index = hull.occupancy.nonzero()
     if len(index) == 0:
         raise DataError(

@@ -17,7 +17,8 @@ from charnerf.markdown import table
 from charnerf.meshing.build import BuiltMesh, find_surface, finish_mesh
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.options import MeshOptions
-from charnerf.types import Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import SourceViews
 
 PAPER = {64: (1822, 3640), 128: (7646, 15288), 256: (49582, 98972)}
 """Vertices and polygons of the paper's Table I by grid."""

@@ -18,7 +18,8 @@ from torch.nn import functional as F
 from charnerf.geometry.cameras import pixel_rays, project_into_all
 from charnerf.geometry.rays import box_interval, points_along
 from charnerf.meshing.density_grid import DensityGrid, densities_inside
-from charnerf.types import Cameras, Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import Cameras, SourceViews
 
 MASK_ALPHA = 0.5
 ABOVE = 1.1  # of the level: where the densest place of a ray is brought to; what is 0.91 times as dense is inside then
@@ -77,8 +78,7 @@ def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sur
     """Largest density inside the hull along the rays of a mask's pixels (H, W), 1/m; infinite where the grid reaches `sure`."""
     y, x = mask.nonzero().unbind(-1)
     rays = pixel_rays(camera[0], torch.stack((x + 0.5, y + 0.5), dim=-1).to(camera.focal.dtype))
-    box = (scene.box_min, scene.box_max) if scene.hull is None else (scene.hull.box_min, scene.hull.box_max)
-    near, far = box_interval(rays, *box)
+    near, far = box_interval(rays, *scene.bounds.tight_box)
     if len(near) == 0:
         return near
     num = max(2, int(float((far - near).max()) / STEP))

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import final
 
 import torch
 from torch import Tensor
 
-from charnerf.geometry.hull import may_hold
-from charnerf.geometry.occupied import coarse_occupancy
+from charnerf.geometry.bounds import Bounds
 from charnerf.meshing.density_grid import densities_inside
-from charnerf.types import DensityAnswer, FieldFunction, FieldOutput, Hull, Scene, TensorRecord
+from charnerf.scene import AbstractField, DensityOutput, Scene
+from charnerf.types import FieldOutput, Hull, TensorRecord
 
 OTHER_SIDE = 0.01  # weight of the mirrored side's colour: it counts only where the own side is empty
-
-
-@dataclass(frozen=True)
-class _Asked(TensorRecord):
-    """Points (P, 3) and directions (P, 3) whose colours may be wanted."""
-
-    points: Tensor
-    view_dirs: Tensor
 
 
 def symmetric_scene(scene: Scene) -> Scene:
@@ -36,29 +29,65 @@ def symmetric_scene(scene: Scene) -> Scene:
     Returns:
         A scene of one field, whose hull is the union of the hull and its mirror image (or a little more).
     """
+    return Scene(SymmetricField(scene), None, _symmetric_bounds(scene.bounds))
 
-    def densities(points: Tensor, view_dirs: Tensor) -> DensityAnswer:
-        both = [densities_inside(scene, p, d) for p, d in ((points, view_dirs), mirrored(points, view_dirs))]
-        mean = 0.5 * (both[0] + both[1])
-        return DensityAnswer(
-            mean, _Asked(points, view_dirs), lambda asked: field(asked.points, asked.view_dirs).rgb
+
+@dataclass(frozen=True)
+class _Points(TensorRecord):
+    """Points (P, 3) and directions (P, 3) whose colours may be wanted."""
+
+    points: Tensor
+    view_dirs: Tensor
+
+
+@final
+@dataclass(frozen=True)
+class SymmetricField(AbstractField):
+    """Density of both sides of a scene's finest field, colours of the own one."""
+
+    scene: Scene
+
+    @property
+    def sees_directions(self) -> bool:
+        """As the field's."""
+        return self.scene.field.sees_directions
+
+    @property
+    def bytes_per_point(self) -> int:
+        """As the field's."""
+        return self.scene.field.bytes_per_point
+
+    def __call__(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
+        """Colours (P, 3) and densities (P,)."""
+        own, other = self._inside(points, view_dirs), self._inside(*mirrored(points, view_dirs))
+        tiny = torch.finfo(points.dtype).tiny
+        weight = own.densities + tiny
+        share = (weight / (weight + OTHER_SIDE * other.densities))[:, None]
+        return FieldOutput(
+            rgb=share * own.rgb + (1.0 - share) * other.rgb, densities=0.5 * (own.densities + other.densities)
         )
 
-    field = _symmetric_field(scene)
-    hull = None if scene.hull is None else symmetric_hull(scene.hull)
-    at_width, in_outlines = scene.at_width, scene.in_outlines
-    return replace(
-        scene,
-        coarse=field,
-        fine=None,
-        hull=hull,
-        densities_first=densities,
-        coarse_hull=None if hull is None else coarse_occupancy(hull.occupancy),
-        at_width=None if at_width is None else lambda width: symmetric_scene(at_width(width)),
-        in_outlines=None
-        if in_outlines is None
-        else lambda points: in_outlines(points) | in_outlines(mirrored(points, points)[0]),
-    )
+    def densities(self, points: Tensor, view_dirs: Tensor) -> DensityOutput:
+        """Densities (P,); colours are asked for by point."""
+        own, other = (
+            densities_inside(self.scene, p, d) for p, d in ((points, view_dirs), mirrored(points, view_dirs))
+        )
+        return DensityOutput(0.5 * (own + other), _Points(points, view_dirs))
+
+    def colors(self, state: _Points) -> Tensor:
+        """Colours (Q, 3)."""
+        return self(state.points, state.view_dirs).rgb
+
+    def at_width(self, width: int) -> AbstractField:
+        """Colours from drawings so many pixels wide."""
+        return SymmetricField(self.scene.at_width(width))
+
+    def _inside(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
+        """The field's answers inside of its own bounds, grey and empty outside."""
+        index = self.scene.bounds.may_hold(points).nonzero()[:, 0]
+        answer = self.scene.field(points[index], view_dirs[index])
+        rgb = torch.full_like(points, 0.5).index_copy(0, index, answer.rgb)
+        return FieldOutput(rgb, points.new_zeros(len(points)).index_copy(0, index, answer.densities))
 
 
 def mirrored(points: Tensor, view_dirs: Tensor) -> tuple[Tensor, Tensor]:
@@ -67,25 +96,15 @@ def mirrored(points: Tensor, view_dirs: Tensor) -> tuple[Tensor, Tensor]:
     return points * flip, view_dirs * flip
 
 
-def _symmetric_field(scene: Scene) -> FieldFunction:
-    """Density of both sides, colours of the own one."""
-
-    def masked(points: Tensor, view_dirs: Tensor) -> FieldOutput:
-        index = may_hold(scene, points).nonzero()[:, 0]
-        found = scene.field(points[index], view_dirs[index])
-        rgb = torch.full_like(points, 0.5).index_copy(0, index, found.rgb)
-        return FieldOutput(rgb, points.new_zeros(len(points)).index_copy(0, index, found.densities))
-
-    def field(points: Tensor, view_dirs: Tensor) -> FieldOutput:
-        own, other = masked(points, view_dirs), masked(*mirrored(points, view_dirs))
-        tiny = torch.finfo(points.dtype).tiny
-        weight = own.densities + tiny
-        share = (weight / (weight + OTHER_SIDE * other.densities))[:, None]
-        return FieldOutput(
-            rgb=share * own.rgb + (1.0 - share) * other.rgb, densities=0.5 * (own.densities + other.densities)
-        )
-
-    return field
+def _symmetric_bounds(bounds: Bounds) -> Bounds:
+    hull, outlines = bounds.hull, bounds.outlines
+    return replace(
+        bounds,
+        hull=None if hull is None else symmetric_hull(hull),
+        outlines=None
+        if outlines is None
+        else lambda points: outlines(points) | outlines(mirrored(points, points)[0]),
+    )
 
 
 def symmetric_hull(hull: Hull) -> Hull:

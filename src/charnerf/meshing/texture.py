@@ -17,7 +17,8 @@ from scipy.sparse.linalg import spsolve
 from charnerf.meshing.atlas import Atlas, Texels, rasterise, unwrap
 from charnerf.meshing.colour import field_colours
 from charnerf.meshing.projection import Projector
-from charnerf.types import Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import SourceViews
 
 ENOUGH = 0.1  # trust from which the drawings decide alone
 FADE = 0.08  # metres over which the field's colours are matched to the drawings' beside them

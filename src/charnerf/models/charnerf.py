@@ -1,28 +1,27 @@
 """The model: drawings -> encoder -> feature maps -> scenes that answer points with colour and density."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
 from typing import final
 
 import torch
 from torch import Tensor, nn
 
 from charnerf.errors import ShapeError
+from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.hull import build_hull
-from charnerf.geometry.occupied import coarse_occupancy
 from charnerf.geometry.resizing import resized_views
 from charnerf.models.encoders.base import AbstractEncoder
 from charnerf.models.features.base import AbstractFeatures, ViewReadings
-from charnerf.models.field import Field
+from charnerf.models.field import Field, PendingColors
 from charnerf.models.inputs import PointInputs
 from charnerf.models.lookup import maps_to_rows
 from charnerf.models.view_maps import Pictures, ViewMaps, kept_share
 from charnerf.models.views.base import AbstractViews
 from charnerf.pictures import images_on_white
-from charnerf.types import DensityFunction, FieldFunction, Hull, Scene, SourceViews, TensorRecord
+from charnerf.scene import AbstractField, DensityOutput, Scene
+from charnerf.types import FieldOutput, Hull, SourceViews, TensorRecord
 
-BYTES_A_FEATURE = 64  # of a view and a point, gradient kept: some 16 tensors of float32; measured, generous
+BYTES_PER_FEATURE = 64  # of a view and a point, gradient kept: some 16 tensors of float32; measured, generous
 HULL_DEPTH_FADE = 20.0  # per half-extent: a point this share behind the hull's front counts as hidden by 1/e
 
 
@@ -173,46 +172,16 @@ class CharNeRF(nn.Module):
         hull = encoded.hull[index] if encoded.hull is not None else None
         maps = encoded.feature_maps[index][present]
         rows = maps_to_rows(maps)
-        latents = self.coarse.hoist(rows), None if self.fine is None else self.fine.hoist(rows)
         view_maps = self.view_maps(views, hull, present, maps)
-        answer = partial(
-            self.point_inputs,
-            maps=view_maps,
-            mirrored=views.mirrored.to(maps.dtype),
-        )
+        detailed = None if encoded.detailed is None else encoded.detailed[index][present]
 
-        coarse_hull = None if hull is None else coarse_occupancy(hull.occupancy)
-        box_min, box_max = self.box
+        def answering(field: Field) -> CharacterField:
+            mirrored = views.mirrored.to(maps.dtype)
+            return CharacterField(self, field, view_maps, field.hoist(rows), mirrored, detailed)
 
-        def scene_of(finer: Pictures | None, at_width: Callable[[int], Scene] | None) -> Scene:
-            """The scene, its colours read from finer pictures where there are any."""
-            coarse, densities = _field_of(self.coarse, partial(answer, latents=latents[0]), finer)
-            fine = None
-            if self.fine is not None:
-                fine, densities = _field_of(self.fine, partial(answer, latents=latents[1]), finer)
-            return Scene(
-                coarse=coarse,
-                fine=fine,
-                hull=hull,
-                box_min=box_min,
-                box_max=box_max,
-                density_sees_directions=self.coarse.density.sees_directions,
-                densities_first=densities,
-                coarse_hull=coarse_hull,
-                bytes_a_point=BYTES_A_FEATURE * len(present) * self.coarse.from_latents.out_features,
-                at_width=at_width,
-                in_outlines=None if view_maps.shown is None else view_maps.in_outlines,
-            )
-
-        if encoded.detailed is None:
-            return scene_of(None, None)
-        detailed, encoded_width = encoded.detailed[index][present], encoded.views.cameras.width
-
-        @lru_cache(maxsize=1)
-        def at_width(width: int) -> Scene:
-            return scene_of(Pictures.of(detailed, width) if width > encoded_width else None, None)
-
-        return scene_of(None, at_width) if encoded.width <= encoded_width else at_width(encoded.width)
+        coarse, fine = answering(self.coarse), None if self.fine is None else answering(self.fine)
+        outlines = None if view_maps.shown is None else view_maps.in_outlines
+        return Scene(coarse, fine, Bounds(*self.box, hull, outlines)).at_width(encoded.width)
 
     def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
         """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
@@ -251,7 +220,7 @@ class CharNeRF(nn.Module):
             latents=sight.latents,
             point_features=self.features(readings),
             source_rgb=sight.rgb,
-            shares=sight.shares,
+            uv=sight.uv,
             visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
             valid=sight.valid,
             encoded_points=self.coarse.single_view.locate(
@@ -264,15 +233,64 @@ class CharNeRF(nn.Module):
         )
 
 
-def _field_of(
-    field: Field, inputs: Callable[[Tensor, Tensor], PointInputs], finer: Pictures | None
-) -> tuple[FieldFunction, DensityFunction]:
-    """A field as functions of points and directions; finer pictures are read only where colours are asked for."""
+@final
+@dataclass(frozen=True)
+class CharacterField(AbstractField):
+    """One of the model's fields for one character.
 
-    def coloured(seen: PointInputs) -> PointInputs:
-        return seen if finer is None else replace(seen, source_rgb=finer.read(seen.shares))
+    Attributes:
+        network: The model.
+        field: Its coarse or fine field.
+        maps: What the character's views show.
+        latents: Rows of the feature maps, through the field's linear layer.
+        mirrored: (V,), 1 where a view is mirrored.
+        detailed: The views with more pixels, (V, 3, H, W), or None.
+        pictures: What colours are read from instead of `maps`, or None.
+    """
 
-    return (
-        lambda points, view_dirs: field(coloured(inputs(points, view_dirs))),
-        lambda points, view_dirs: field.densities(inputs(points, view_dirs), coloured),
-    )
+    network: CharNeRF
+    field: Field
+    maps: ViewMaps
+    latents: Tensor
+    mirrored: Tensor
+    detailed: Tensor | None
+    pictures: Pictures | None = None
+
+    @property
+    def sees_directions(self) -> bool:
+        """Whether densities depend on the query direction."""
+        return self.field.density.sees_directions
+
+    @property
+    def bytes_per_point(self) -> int:
+        """By the number of views and the features' width."""
+        return BYTES_PER_FEATURE * len(self.mirrored) * self.field.from_latents.out_features
+
+    def __call__(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
+        """Colours (P, 3) and densities (P,)."""
+        return self.field(self._colored(self._inputs(points, view_dirs)))
+
+    def densities(self, points: Tensor, view_dirs: Tensor) -> DensityOutput:
+        """Densities (P,); colours are read and made when they are asked for."""
+        return self.field.densities(self._inputs(points, view_dirs))
+
+    def colors(self, state: PendingColors) -> Tensor:
+        """Colours (Q, 3)."""
+        return self.field.colors(state.trunk, self._colored(state.inputs))
+
+    def at_width(self, width: int) -> "CharacterField":
+        """Colours from the detailed drawings, so many pixels wide; from the encoded ones where those are as wide."""
+        if self.detailed is None:
+            return self
+        pictures = Pictures.of(self.detailed, width) if width > self.maps.cameras.width else None
+        return replace(self, pictures=pictures)
+
+    def _inputs(self, points: Tensor, view_dirs: Tensor) -> PointInputs:
+        return self.network.point_inputs(
+            points, view_dirs, maps=self.maps, latents=self.latents, mirrored=self.mirrored
+        )
+
+    def _colored(self, inputs: PointInputs) -> PointInputs:
+        if self.pictures is None:
+            return inputs
+        return replace(inputs, source_rgb=self.pictures.read(inputs.uv))

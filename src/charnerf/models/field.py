@@ -1,6 +1,5 @@
 """One radiance field: lookup -> f1 -> H -> f2 -> colour and density. Coarse and fine are two of these over one encoder."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -13,7 +12,8 @@ from charnerf.models.heads.base import AbstractHead
 from charnerf.models.inputs import PointInputs
 from charnerf.models.single_view.base import AbstractSingleView
 from charnerf.models.stages import MultiView
-from charnerf.types import DensityAnswer, FieldOutput, TensorRecord
+from charnerf.scene import DensityOutput
+from charnerf.types import FieldOutput, TensorRecord
 
 
 @final
@@ -60,21 +60,12 @@ class Field(nn.Module):
         rgb = self.colors(trunk, inputs)
         return FieldOutput(rgb=rgb, densities=self.kept_densities(trunk, inputs))
 
-    def densities(self, inputs: PointInputs, coloured: Callable[[PointInputs], PointInputs]) -> DensityAnswer:
-        """Densities (P,) of points, and on demand the colours of some of them: `forward` in two steps.
-
-        Args:
-            inputs: Points as the views see them.
-            coloured: What the head sees of points whose colours are asked for, from what the trunk saw.
-        """
+    def densities(self, inputs: PointInputs) -> DensityOutput:
+        """Densities (P,) of points, and what `colors` needs of them: `forward` in two steps."""
         trunk = self.trunk(inputs)
         # what only the trunk reads need not be kept
         seen = replace(inputs, latents=inputs.latents[..., :0], point_features=inputs.point_features[..., :0])
-        return DensityAnswer(
-            densities=self.kept_densities(trunk, inputs),
-            state=_Half(trunk, seen),
-            colours=lambda half: self.colors(half.trunk, coloured(half.inputs)),
-        )
+        return DensityOutput(self.kept_densities(trunk, inputs), PendingColors(trunk, seen))
 
     def trunk(self, inputs: PointInputs) -> TrunkOutput:
         """What the densities of points (P) need: f1, H and f2, each with the direction that it may see."""
@@ -117,8 +108,8 @@ def _seen(view_dirs: Tensor, sees_directions: bool) -> Tensor:
 
 
 @dataclass(frozen=True)
-class _Half(TensorRecord):
-    """What is known of points once their densities are."""
+class PendingColors(TensorRecord):
+    """What colours of points are made of, once their densities are there."""
 
     trunk: TrunkOutput
     inputs: PointInputs

@@ -86,7 +86,7 @@ def _random_inputs(field: Field, model: CharNeRF) -> PointInputs:
         latents=field.hoist(rows).view(NUM_POINTS, NUM_VIEWS, -1),
         point_features=normal(NUM_POINTS, NUM_VIEWS, model.features.num_point_features),
         source_rgb=torch.rand(NUM_POINTS, NUM_VIEWS, 3, generator=generator),
-        shares=torch.rand(NUM_POINTS, NUM_VIEWS, 2, generator=generator),
+        uv=torch.rand(NUM_POINTS, NUM_VIEWS, 2, generator=generator),
         visibility=visibility,
         valid=visibility > 0.2,
         encoded_points=field.single_view.locate(unit(NUM_POINTS, 3), rotations),

@@ -15,7 +15,7 @@ class PointInputs(TensorRecord):
         latents: (P, V, L), encoder features at the projections, already through the field's linear layer.
         point_features: (P, V, E), further inputs per view (see models/features); E may be 0.
         source_rgb: (P, V, 3) in [0, 1], colour of the drawings at the projections.
-        shares: (P, V, 2), the projections in shares of the drawings' sides.
+        uv: (P, V, 2), the projections, by the drawings' sides.
         visibility: (P, V) in [0, 1], 1 on the side of the hull that faces the view, falling with depth behind it.
         valid: (P, V), bool: in front of the camera and inside the picture.
         encoded_points: (P, C) or (P, V, C), where the points lie, as f1 encodes it.
@@ -28,7 +28,7 @@ class PointInputs(TensorRecord):
     latents: Tensor
     point_features: Tensor
     source_rgb: Tensor
-    shares: Tensor
+    uv: Tensor
     visibility: Tensor
     valid: Tensor
     encoded_points: Tensor

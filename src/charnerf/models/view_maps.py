@@ -26,7 +26,7 @@ class Sight:
     Attributes:
         latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
         rgb: (P, V, 3), colour of the drawings.
-        shares: (P, V, 2), where they project, in shares of the pictures' sides.
+        uv: (P, V, 2), where they project, by the pictures' sides.
         front: (P, V), m, distance of the hull's front along the view's ray.
         edge: (P, V), pixels, distance from the mask's edge.
         along_ray: (P, V), m, distance of the point along the view's ray.
@@ -37,7 +37,7 @@ class Sight:
 
     latents: Tensor
     rgb: Tensor
-    shares: Tensor
+    uv: Tensor
     front: Tensor | None
     edge: Tensor | None
     along_ray: Tensor
@@ -135,13 +135,13 @@ class ViewMaps:
         seen = read_rows(
             self.pictures, *bilinear_rows(pixels, width=cameras.width, height=cameras.height)
         ).unflatten(0, leading)
-        shares = pixels / size
-        front, edge = self._hull_readings(shares, seen)
+        uv = pixels / size
+        front, edge = self._hull_readings(uv, seen)
         directions, along_ray = self._directions(points, depth)
         return Sight(
             latents=read.unflatten(0, leading),
             rgb=seen[..., :3],
-            shares=shares,
+            uv=uv,
             front=front,
             edge=edge,
             along_ray=along_ray,
@@ -165,14 +165,14 @@ class ViewMaps:
             return nothing, nothing
         return read_cross_sections(self.sections, points)
 
-    def _hull_readings(self, shares: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
+    def _hull_readings(self, uv: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
         if self.hull_size == (0, 0):
             return None, None
         if self.hull_rows is None:
             return seen[..., -2], seen[..., -1]
         width, height = self.hull_size
-        own = bilinear_rows(shares * shares.new_tensor(self.hull_size), width=width, height=height)
+        own = bilinear_rows(uv * uv.new_tensor(self.hull_size), width=width, height=height)
         front, edge = read_rows(self.hull_rows, *own).unflatten(0, seen.shape[:2]).unbind(-1)
         return front, edge
 
@@ -207,11 +207,11 @@ class Pictures:
             pictures = resized_pictures(pictures, width, round(width * tall / wide))
         return cls(maps_to_rows(pictures), (pictures.shape[-1], pictures.shape[-2]))
 
-    def read(self, shares: Tensor) -> Tensor:
-        """Colours (P, V, 3) at places (P, V, 2), shares of the sides."""
+    def read(self, uv: Tensor) -> Tensor:
+        """Colours (P, V, 3) at places (P, V, 2), by the sides."""
         width, height = self.size
-        own = bilinear_rows(shares * shares.new_tensor(self.size), width=width, height=height)
-        return read_rows(self.rows, *own).unflatten(0, shares.shape[:2])
+        own = bilinear_rows(uv * uv.new_tensor(self.size), width=width, height=height)
+        return read_rows(self.rows, *own).unflatten(0, uv.shape[:2])
 
 
 def kept_share(coverage: Tensor) -> Tensor:

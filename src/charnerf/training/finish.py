@@ -22,7 +22,8 @@ from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
 from charnerf.reporting.run_report import write_run_report
-from charnerf.types import Scene, SourceViews
+from charnerf.scene import Scene
+from charnerf.types import SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)

@@ -16,7 +16,8 @@ from charnerf.losses.directions import AbstractDirections
 from charnerf.losses.total import PassOutput, WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.combinators.base import AbstractCombinator
-from charnerf.types import FieldFunction, RenderOutput, TrainBatch
+from charnerf.scene import AbstractField
+from charnerf.types import RenderOutput, TrainBatch
 from charnerf.volume.compositing import alphas_from_densities
 from charnerf.volume.renderers.base import AbstractRenderer
 
@@ -106,7 +107,7 @@ class TrainingModule(L.LightningModule):
     def _pass(
         self,
         outputs: list[RenderOutput],
-        fields: list[FieldFunction],
+        fields: list[AbstractField],
         surface_dirs: list[Tensor],
         batch: TrainBatch,
     ) -> PassOutput:

@@ -12,17 +12,16 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.geometry.occupied import candidates, coarse_occupancy, occupied_at, segment_bins
+from charnerf.geometry.occupied import candidates, occupied_at, segment_bins
 from charnerf.geometry.rays import box_interval
+from charnerf.scene import AbstractField, Scene
 from charnerf.types import (
     ErrorEstimate,
-    FieldFunction,
     FieldOutput,
     LeftOut,
     RayBundle,
     Rendering,
     RenderOutput,
-    Scene,
 )
 from charnerf.volume.compositing import expected_depth
 from charnerf.volume.quadrature.base import AbstractQuadrature
@@ -93,7 +92,7 @@ class AdaptiveRenderer(AbstractRenderer):
         if generator is not None or torch.is_grad_enabled():
             return self._culled.render(scene, rays, generator)
         index, near, far = _candidates(scene, rays)
-        block = max(64, min(RAYS_AT_ONCE, chunk_size(self.memory_mib, scene.bytes_a_point) // 4))
+        block = max(64, min(RAYS_AT_ONCE, chunk_size(self.memory_mib, scene.field.bytes_per_point) // 4))
         with torch.inference_mode():  # spares small operations a tenth; what is returned is made outside
             blocks = [
                 self._render_block(scene, rays[index[i : i + block]], near[i : i + block], far[i : i + block])
@@ -104,7 +103,7 @@ class AdaptiveRenderer(AbstractRenderer):
     def _render_block(self, scene: Scene, rays: RayBundle, near: Tensor, far: Tensor) -> "_Block":
         """Render some rays (R,) between near and far (R,), m."""
         ways = _ways(scene, rays, near, far, self.hull_steps)
-        samples = Samples(scene, rays, chunk_size(self.memory_mib, scene.bytes_a_point))
+        samples = Samples(scene, rays, chunk_size(self.memory_mib, scene.field.bytes_per_point))
         s_edges, begins = segment_bins(ways.occupied, ways.t_edges.diff(dim=-1), SPACING, MAX_BINS)
         numbers = self._first_samples(samples, ways, s_edges)
         block = _Block.empty(rays, far, samples)
@@ -206,7 +205,7 @@ class AdaptiveRenderer(AbstractRenderer):
 
     def _evaluate(
         self,
-        field: FieldFunction,
+        field: AbstractField,
         points: Tensor,
         dirs: Tensor,
         inside: Tensor,
@@ -233,23 +232,23 @@ class _Ways:
 
 
 def _ways(scene: Scene, rays: RayBundle, near: Tensor, far: Tensor, num_steps: int) -> _Ways:
-    if scene.hull is None:
+    if scene.bounds.hull is None:
         t_edges = torch.stack((near, far), dim=-1)
         return _Ways(t_edges, torch.ones_like(near[:, None], dtype=torch.bool), (far - near)[:, None])
+    hull = scene.bounds.hull
     share = torch.linspace(0.0, 1.0, num_steps + 1, dtype=near.dtype, device=near.device)
     t_edges = torch.addcmul(near[:, None], (far - near)[:, None], share)
-    occupied = occupied_at(scene.hull.occupancy, scene.hull, rays, 0.5 * (t_edges[:, 1:] + t_edges[:, :-1]))
+    occupied = occupied_at(hull.occupancy, hull, rays, 0.5 * (t_edges[:, 1:] + t_edges[:, :-1]))
     return _Ways(t_edges, occupied, (t_edges.diff(dim=-1) * occupied).cumsum(-1))
 
 
 def _candidates(scene: Scene, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor]:
     """Rays (R,) that may meet something: index, near and far."""
-    if scene.hull is not None:
-        coarse = scene.coarse_hull
-        coarse = coarse_occupancy(scene.hull.occupancy) if coarse is None else coarse
-        found = candidates(scene.hull, coarse, rays)
+    bounds = scene.bounds
+    if bounds.hull is not None and bounds.coarse_hull is not None:
+        found = candidates(bounds.hull, bounds.coarse_hull, rays)
         return found.index, found.near, found.far
-    near, far = box_interval(rays, scene.box_min, scene.box_max)
+    near, far = box_interval(rays, *bounds.tight_box)
     index = (far > near).nonzero()[:, 0]
     return index, near[index], far[index]
 

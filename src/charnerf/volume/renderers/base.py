@@ -15,19 +15,18 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.geometry.hull import may_hold, occupied_edges
+from charnerf.geometry.hull import occupied_edges
 from charnerf.geometry.rays import box_interval, occupied_to_t, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, merge_t_vals, stratified_t_vals
+from charnerf.scene import AbstractField, Scene
 from charnerf.types import (
     Cameras,
     ErrorEstimate,
-    FieldFunction,
     FieldOutput,
     LeftOut,
     RayBundle,
     Rendering,
     RenderOutput,
-    Scene,
 )
 from charnerf.volume.compositing import composite, expected_depth
 from charnerf.volume.quadrature.base import AbstractQuadrature
@@ -121,16 +120,16 @@ class AbstractRenderer(ABC):
         return fine, coarse, left_out + more
 
     def _one_pass(
-        self, scene: Scene, field: FieldFunction, seen: OccupiedRays, s_vals: Tensor
+        self, scene: Scene, field: AbstractField, seen: OccupiedRays, s_vals: Tensor
     ) -> tuple[RenderOutput, Tensor, LeftOut]:
         """Evaluate a field at samples and composite: output (R,), densities (R, S), counts."""
         t_vals = occupied_to_t(seen.t_edges, seen.occupied, s_vals)
         points = points_along(seen.rays, t_vals)
         dirs = seen.rays.directions[:, None].expand_as(points)
-        inside = (seen.length > 0)[:, None] & may_hold(scene, points)
-        chunk = chunk_size(self.memory_mib, scene.bytes_a_point)
+        inside = (seen.length > 0)[:, None] & scene.bounds.may_hold(points)
+        chunk = chunk_size(self.memory_mib, field.bytes_per_point)
         if not torch.is_grad_enabled():  # each chunk would give the maps a dense gradient of its own
-            chunk = min(chunk, self.points_at_once, points_in_caches(scene.bytes_a_point))
+            chunk = min(chunk, self.points_at_once, points_in_caches(field.bytes_per_point))
         s_edges = self._edges(seen, s_vals)
         answer, evaluated = self._evaluate(
             field,
@@ -153,7 +152,7 @@ class AbstractRenderer(ABC):
     @abstractmethod
     def _evaluate(
         self,
-        field: FieldFunction,
+        field: AbstractField,
         points: Tensor,
         dirs: Tensor,
         inside: Tensor,
@@ -181,13 +180,14 @@ class AbstractRenderer(ABC):
 
     def occupied(self, scene: Scene, rays: RayBundle) -> OccupiedRays:
         """Where rays (R,) may meet something."""
-        if scene.hull is None:
-            near, far = box_interval(rays, scene.box_min, scene.box_max)
+        bounds = scene.bounds
+        if bounds.hull is None:
+            near, far = box_interval(rays, *bounds.tight_box)
             return OccupiedRays(rays, torch.stack((near, far), dim=-1), (far > near)[:, None], far - near)
-        t_edges, occupied = occupied_edges(scene.hull, rays, self.hull_steps, scene.coarse_hull)
+        t_edges, occupied = occupied_edges(bounds.hull, rays, self.hull_steps, bounds.coarse_hull)
         return OccupiedRays(rays, t_edges, occupied, (torch.diff(t_edges, dim=-1) * occupied).sum(-1))
 
-    def _in_chunks(self, field: FieldFunction, points: Tensor, dirs: Tensor, size: int) -> FieldOutput:
+    def _in_chunks(self, field: AbstractField, points: Tensor, dirs: Tensor, size: int) -> FieldOutput:
         """Answers at points (P, 3), a chunk of that size at a time."""
         parts = [field(points[i : i + size], dirs[i : i + size]) for i in range(0, len(points), size)]
         if not parts:
@@ -206,14 +206,14 @@ POINTS_AT_ONCE = (
 BYTES_AT_ONCE = 96 * 2**20
 
 
-def points_in_caches(bytes_a_point: int) -> int:
+def points_in_caches(bytes_per_point: int) -> int:
     """Points a chunk without gradient of a wide field: above, the system hands out the memory of each tensor anew."""
-    return max(256, BYTES_AT_ONCE // bytes_a_point)
+    return max(256, BYTES_AT_ONCE // bytes_per_point)
 
 
-def chunk_size(memory_mib: float, bytes_a_point: int = 16_384) -> int:
+def chunk_size(memory_mib: float, bytes_per_point: int = 16_384) -> int:
     """Points a chunk within a memory budget, at least 256."""
-    return max(256, int(memory_mib * 2**20 / bytes_a_point))
+    return max(256, int(memory_mib * 2**20 / bytes_per_point))
 
 
 def _joined(estimates: list[ErrorEstimate], shape: tuple[int, int]) -> ErrorEstimate | None:

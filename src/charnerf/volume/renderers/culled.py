@@ -6,7 +6,8 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.types import FieldFunction, FieldOutput, LeftOut, RayBundle, Rendering, RenderOutput, Scene
+from charnerf.scene import AbstractField, Scene
+from charnerf.types import FieldOutput, LeftOut, RayBundle, Rendering, RenderOutput
 from charnerf.volume.renderers.base import WHITE, AbstractRenderer
 
 UNSEEN = 1e-6  # of the light: a sample that less of it reaches is not seen; a colour in float32 is rounded to a tenth of that
@@ -38,7 +39,7 @@ class CulledRenderer(AbstractRenderer):
 
     def _evaluate(
         self,
-        field: FieldFunction,
+        field: AbstractField,
         points: Tensor,
         dirs: Tensor,
         inside: Tensor,

@@ -6,7 +6,8 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.types import FieldFunction, FieldOutput, LeftOut, RayBundle, Rendering, Scene
+from charnerf.scene import AbstractField, Scene
+from charnerf.types import FieldOutput, LeftOut, RayBundle, Rendering
 from charnerf.volume.renderers.base import AbstractRenderer
 
 
@@ -23,7 +24,7 @@ class DenseRenderer(AbstractRenderer):
 
     def _evaluate(
         self,
-        field: FieldFunction,
+        field: AbstractField,
         points: Tensor,
         dirs: Tensor,
         inside: Tensor,

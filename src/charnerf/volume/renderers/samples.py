@@ -7,8 +7,8 @@ evaluation; -1 is none.
 import torch
 from torch import Tensor
 
-from charnerf.geometry.hull import may_hold
-from charnerf.types import DensityAnswer, RayBundle, Scene, TensorRecord
+from charnerf.scene import DensityOutput, Scene
+from charnerf.types import RayBundle, TensorRecord
 from charnerf.volume.renderers.base import POINTS_AT_ONCE, points_in_caches
 
 UNKNOWN = 0.5  # colour of samples that nobody asked for
@@ -26,12 +26,12 @@ class Samples:
     def __init__(self, scene: Scene, rays: RayBundle, points_at_once: int) -> None:
         self.scene = scene
         self.rays = rays
-        self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.bytes_a_point))
+        self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.field.bytes_per_point))
         self.num_colours = 0
         self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
         self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
         self._known = torch.zeros(1, dtype=torch.bool, device=rays.origins.device)
-        self._answers: list[tuple[int, DensityAnswer]] = []
+        self._answers: list[tuple[int, DensityOutput]] = []
 
     def __len__(self) -> int:
         """Samples whose density is known."""
@@ -58,11 +58,11 @@ class Samples:
         directions = self.rays.directions[ray]
         points = torch.addcmul(self.rays.origins[ray], directions, t_vals[row, column, None])
         start, count, found = len(self), len(points), []
-        held = may_hold(self.scene, points)
+        held = self.scene.bounds.may_hold(points)
         asked, empty = held.nonzero()[:, 0], (~held).nonzero()[:, 0]
         for first in range(0, len(asked), self.size):
             some = asked[first : first + self.size]
-            answer = self.scene.answer_densities(points[some], directions[some])
+            answer = self.scene.field.densities(points[some], directions[some])
             self._answers.append((start + first, answer))
             found.append(answer.densities)
         found.append(self._densities.new_zeros(len(empty)))
@@ -98,9 +98,8 @@ class Samples:
 
     def _evaluate(self, state: TensorRecord, count: int) -> Tensor:
         """Colours (count, 3) of parts of answers, in chunks."""
-        colours = self._answers[0][1].colours
         parts = [
-            colours(state[i : i + self.size] if count > self.size else state)
+            self.scene.field.colors(state[i : i + self.size] if count > self.size else state)
             for i in range(0, count, self.size)
         ]
         return torch.cat(parts).to(self._rgb.dtype)
