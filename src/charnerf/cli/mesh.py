@@ -170,7 +170,7 @@ def _measure(
         "grid": options.resolution,
         "faces": options.faces,
         "texels": options.texture_size,
-        **environment(heroes[0].scene.box_min.device),
+        **environment(heroes[0].scene.bounds.box_min.device),
         "peak_memory_mib": round(process_peak_mib()),
     }
     text = score_text(rows, facts)
