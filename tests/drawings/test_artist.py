@@ -6,9 +6,10 @@ import torch
 
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
-from charnerf.drawings.artist import PAPER, draw_character, write_drawings
+from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawings
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
+from charnerf.errors import ConfigError
 
 
 @pytest.fixture(scope="module")
@@ -43,3 +44,15 @@ def test_reconstruct_reads_them_as_the_silhouettes_that_were_drawn(character, tm
             rows, columns = torch.nonzero(mask, as_tuple=True)
             extents.append(float((columns.max() - columns.min() + 1) / (rows.max() - rows.min() + 1)))
         assert extents[0] == pytest.approx(extents[1], abs=0.08)  # two pixels of 32
+
+
+def test_views_differ_more_from_level_to_level(character):
+    """From as captured to other poses: the back's outline leaves the mirrored front's."""
+    apart = []
+    for level in range(len(LEVELS)):
+        front, side, back = draw_character(character, size=128, seed=5, level=level).values()
+        read = read_views(turnaround(front, side, back), size=64, reconciled=False)
+        apart.append(read.reconciliation.views[2].apart_before)
+    assert apart[0] <= apart[1] < apart[3] and apart[2] < apart[3]
+    with pytest.raises(ConfigError, match="level: found 4, expected 0 to 3"):
+        draw_character(character, size=64, seed=1, level=4)

@@ -25,3 +25,14 @@ def textured_quad(pixels, **material):
     pbr = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(pixels), **material)
     quad.visual = trimesh.visual.TextureVisuals(uv=[[0, 0], [1, 0], [1, 1], [0, 1]], material=pbr)
     return quad
+
+
+def boxes_surface(boxes: list[tuple[tuple[float, ...], tuple[float, ...]]], *, cuts: int = 4) -> SurfaceMesh:
+    """Boxes by their lower and upper corners, m, each face cut into finer triangles."""
+    meshes = []
+    for low, high in boxes:
+        box = trimesh.creation.box(bounds=np.array((low, high)))
+        for _ in range(cuts):
+            box = box.subdivide()
+        meshes.append(np.asarray(box.triangles))
+    return plain_mesh(np.concatenate(meshes))

@@ -1,6 +1,7 @@
 """Drawings of a data set's characters: what somebody would have drawn of them, on paper."""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,40 +9,92 @@ import torch
 from PIL import Image
 
 from charnerf.capture.character import capture_sources
+from charnerf.capture.poses import find_joints, random_pose, reposed
 from charnerf.data.characters import Character
 from charnerf.data.drawing_style import draw_pictures, random_style
+from charnerf.errors import ConfigError
 from charnerf.geometry.framing import SOURCE_ORDER
-from charnerf.pictures import save_png
+from charnerf.pictures import save_png, to_bytes
 from charnerf.surfaces.mesh_files import load_surface_mesh
+from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 PAPER = (252, 251, 247)
-MISTAKES = {"wobble": 0.006, "shift": 0.01, "scale": 0.015}  # as conf/augmentation/drawing.yaml
 
 
-def draw_character(character: Character, *, size: int, seed: int) -> dict[str, np.ndarray]:
-    """Draw a character in one style for all views.
+@dataclass(frozen=True)
+class Mistakes:
+    """How much views of a character that were drawn one by one may differ.
+
+    Attributes:
+        wobble: Largest displacement by the unsteady hand, by the picture's side.
+        shift: Largest offset of a view, by the picture's side.
+        scale: Largest relative difference in size of a view.
+        limbs_deg: Largest turn of an arm against the front view; legs turn by up to half of it.
+        head_deg: Largest turn of the head against the front view.
+    """
+
+    wobble: float
+    shift: float
+    scale: float
+    limbs_deg: float = 0.0
+    head_deg: float = 0.0
+
+
+LEVELS = (
+    Mistakes(0.0, 0.0, 0.0),
+    Mistakes(0.006, 0.01, 0.015),  # as conf/augmentation/drawing.yaml
+    Mistakes(0.01, 0.03, 0.03, limbs_deg=10.0),
+    Mistakes(0.015, 0.05, 0.05, limbs_deg=30.0, head_deg=30.0),
+)
+"""How far drawings disagree: 0 as captured, 1 a careful hand, 2 a usual one, 3 other poses in side and back."""
+
+
+def draw_character(character: Character, *, size: int, seed: int, level: int = 1) -> dict[str, np.ndarray]:
+    """Draw a character in one style for all views, each view with mistakes of its own.
 
     Args:
-        character: With its mesh; one without is drawn from its source views, at their size.
+        character: With its mesh; one without is drawn from its source views, at their size and in its pose.
         size: Side of the drawings, pixels.
         seed: Of the style and of the hand; another character has another style at the same seed.
+        level: Of disagreement, index into LEVELS; at 0 views are captured and neither inked nor moved.
 
     Returns:
         RGB uint8 (size, size, 3) on paper, by the name of the view.
+
+    Raises:
+        ConfigError: If there is no such level.
     """
+    if not 0 <= level < len(LEVELS):
+        raise ConfigError(f"level: found {level}, expected 0 to {len(LEVELS) - 1}.")
+    mistakes = LEVELS[level]
+    digest = hashlib.sha256(f"{seed} {character.name}".encode()).digest()
+    generator = torch.Generator().manual_seed(int.from_bytes(digest[:7], "little"))
     if character.mesh_file is None:
         names, images = character.source_names, character.sources.images[0]
     else:
         names = SOURCE_ORDER
-        pictures = capture_sources(load_surface_mesh(character.mesh_file), size)
+        pictures = _captured(load_surface_mesh(character.mesh_file), size, mistakes, digest)
         images = torch.from_numpy(pictures).permute(0, 3, 1, 2).float() / 255.0
-    digest = hashlib.sha256(f"{seed} {character.name}".encode()).digest()
-    generator = torch.Generator().manual_seed(int.from_bytes(digest[:7], "little"))
-    drawn = draw_pictures(images, random_style(generator, **MISTAKES), generator)
+    if level > 0:
+        style = random_style(generator, wobble=mistakes.wobble, shift=mistakes.shift, scale=mistakes.scale)
+        images = draw_pictures(images, style, generator)
     paper = torch.tensor(PAPER)[:, None, None] / 255.0
-    rgb = drawn[:, :3] * drawn[:, 3:] + paper * (1.0 - drawn[:, 3:])
-    pixels = (255.0 * rgb).round().to(torch.uint8).permute(0, 2, 3, 1).numpy()
-    return dict(zip(names, pixels, strict=True))
+    rgb = images[:, :3] * images[:, 3:] + paper * (1.0 - images[:, 3:])
+    return dict(zip(names, to_bytes(rgb.permute(0, 2, 3, 1)), strict=True))
+
+
+def _captured(surface: SurfaceMesh, size: int, mistakes: Mistakes, digest: bytes) -> np.ndarray:
+    """Source views RGBA uint8 (V, size, size, 4); all but the front in poses of their own, framed as they are."""
+    pictures = capture_sources(surface, size)
+    if not mistakes.limbs_deg and not mistakes.head_deg:
+        return pictures
+    rng = np.random.default_rng(int.from_bytes(digest[7:15], "little"))
+    joints = find_joints(surface)
+    limbs, head = np.radians(mistakes.limbs_deg), np.radians(mistakes.head_deg)
+    for view in range(1, len(pictures)):
+        pose = random_pose(rng, limbs=limbs, head=head)
+        pictures[view] = capture_sources(reposed(surface, joints, pose), size)[view]
+    return pictures
 
 
 def write_drawings(drawings: dict[str, np.ndarray], folder: Path) -> list[Path]:
