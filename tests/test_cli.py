@@ -1,6 +1,7 @@
 """The command line: help, exit statuses, one message for an error."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -13,10 +14,10 @@ from charnerf.cli import run
 from charnerf.config.composition import compose_config, run_door
 from charnerf.errors import ConfigError, DataError
 from charnerf.inference.build import build_model
-from charnerf.inference.weights import save_weights
+from charnerf.inference.weights import save_config, save_weights
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = ("capture", "generate", "evaluate", "mesh", "reconstruct", "report")
+COMMANDS = ("capture", "generate", "evaluate", "mesh", "reconstruct", "report")  # that Typer describes
 
 
 @pytest.fixture(scope="module")
@@ -165,6 +166,28 @@ def test_evaluate_prints_and_writes_metrics(
     assert run(["evaluate", *arguments, "--split", "nope"]) == 1
 
 
+def test_evaluate_measures_as_many_views_as_the_run_did(
+    dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cfg = compose_config(["scale=smoke", "scale.eval_views=2"])
+    weights = save_weights(tmp_path / "run" / "weights.safetensors", build_model(cfg), cfg)
+    measure = [
+        "evaluate",
+        str(weights),
+        "--data",
+        str(dataset),
+        "--no-mesh",
+        "--no-baselines",
+        "--device",
+        "cpu",
+    ]
+    for expected in (3, 2):  # all that there are, of 24, by weights alone; then as the run's config says
+        capsys.readouterr()
+        assert run(measure) == 0
+        assert json.loads(capsys.readouterr().out)["num_views"] == expected
+        save_config(tmp_path / "run", cfg)
+
+
 def test_mesh_and_reconstruct_write_their_files(dataset: Path, weights: Path, tmp_path: Path) -> None:
     common = ["--resolution", "24", "--device", "cpu"]
     where = ["--data", str(dataset), "--character", "robot", "-o", str(tmp_path / "mesh")]
@@ -203,6 +226,18 @@ def test_levels_of_detail_come_in_one_call_with_one_table(
     assert run(whole[:4] + whole[6:]) == 2
     assert run([*where, "--lod", "16,many"]) == 2
     assert run([*where, "--faces", "3"]) == 2
+
+
+def test_the_shell_completes_names_of_commands() -> None:
+    asked = {"_CHARNERF_COMPLETE": "complete_bash", "COMP_WORDS": "charnerf re", "COMP_CWORD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "charnerf"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, **asked},
+    )
+    assert done.stdout.split() == ["reconstruct", "report"]
 
 
 def test_python_m_charnerf_is_the_command() -> None:
@@ -256,9 +291,20 @@ def test_train_tells_errors_in_one_message(
     assert ("Traceback" in capsys.readouterr().err) == isinstance(error, Exception)
 
 
-def test_train_itself_exits_2(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "train.py"), "combinator=nope"]
+@pytest.mark.parametrize("door", [[str(ROOT / "train.py")], ["-m", "charnerf", "train"]])
+def test_train_itself_exits_2(door: list[str], tmp_path: Path) -> None:
+    command = [sys.executable, *door, "combinator=nope"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert done.returncode == 2
     assert done.stderr.startswith("error: combinator: found no option 'nope', expected one of: ")
     assert not list(tmp_path.iterdir())
+
+
+def test_debug_shows_the_traceback_of_training_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    for arguments in (["--debug", "train", "combinator=nope"], ["train", "combinator=nope", "--debug"]):
+        assert run(arguments) == 2
+        assert "Traceback" in capsys.readouterr().err

@@ -1,5 +1,7 @@
 """What an installed package carries."""
 
+import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -31,6 +33,32 @@ def test_the_version_is_the_projects() -> None:
 def test_config_files_are_found_and_shipped() -> None:
     assert (conf_folder() / "train.yaml").is_file()
     assert PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]["conf"] == "charnerf/conf"
+
+
+def test_an_installed_package_trains_by_its_own_config_files(tmp_path: Path) -> None:
+    """The files laid out as the wheel has them, beside no checkout; what Hydra prints comes through."""
+    package = tmp_path / "site" / "charnerf"
+    shutil.copytree(
+        ROOT / "src" / "charnerf", package, ignore=shutil.ignore_patterns("weights", "__pycache__")
+    )
+    shutil.copytree(ROOT / "conf", package / "conf")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+
+    def train(*arguments: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-m", "charnerf", "train", *arguments],
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=empty,
+            env={**os.environ, "PYTHONPATH": str(package.parent)},
+        )
+        return done.stdout
+
+    assert "image_size: 32" in train("scale=smoke", "--cfg", "job", "--package", "scale")
+    assert "combinator: learned, mean, sa, view_mha" in train("--help")
+    assert not list(empty.iterdir())
 
 
 def test_the_command_is_declared() -> None:

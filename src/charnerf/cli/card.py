@@ -30,7 +30,7 @@ def card(
 
     The words around them stay; curve.png and the metrics are put beside the card.
     """
-    from charnerf.commands import say
+    from charnerf.cli.messages import say
     from charnerf.reporting.card import titled, write_card
 
     for written in write_card(file, curve or [], titled(measured or [])):

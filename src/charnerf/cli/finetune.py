@@ -1,32 +1,25 @@
-"""The command `finetune`: options and help; registered by `charnerf.cli`."""
+"""`charnerf finetune`: weights adapted to one character's drawings."""
 
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from charnerf.cli.options import Device, Folder, Trusted, WeightsOption
+from charnerf.cli.messages import say
+from charnerf.cli.model import load_model
+from charnerf.cli.options import Back, Device, Folder, Front, Side, SideShows, Trusted, WeightsOption
 
 
-def finetune(
-    front: Annotated[
-        Path, typer.Argument(metavar="FRONT", exists=True, dir_okay=False, help="Front view, an image.")
-    ],
-    side: Annotated[Path, typer.Argument(metavar="SIDE", exists=True, dir_okay=False, help="Side view.")],
-    back: Annotated[Path, typer.Argument(metavar="BACK", exists=True, dir_okay=False, help="Back view.")],
+def command(
+    front: Front,
+    side: Side,
+    back: Back,
     *,
     output: Folder,
     weights: WeightsOption = None,
     seconds: Annotated[
         float, typer.Option(min=1.0, help="Time for it; it ends earlier where nothing improves.")
     ] = 30.0,
-    side_shows: Annotated[
-        Literal["left", "right"],
-        typer.Option(
-            "--side",
-            help="Which side of the character SIDE shows; left: its face looks to the picture's left.",
-        ),
-    ] = "left",
+    side_shows: SideShows = "left",
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -36,14 +29,16 @@ def finetune(
     that nothing was learnt from come out better and novel views stay near the start; else DIR gets the starting
     weights, and it is said. They are for this character alone: use them by `--weights DIR`.
     """
-    from charnerf import commands
+    from charnerf.finetuning.command import finetune_drawings
 
-    commands.finetune(
-        (front, side, back),
-        output,
-        weights=weights,
+    model = load_model(weights, device=device, trust=trust)
+    finetune_drawings(
+        model,
+        front=front,
+        side=side,
+        back=back,
+        output=output,
         seconds=seconds,
         side_is=side_shows,
-        device=device,
-        trust=trust or [],
+        say=say,
     )

@@ -28,13 +28,14 @@ Dataset = Annotated[
     Path,
     typer.Option("--data", metavar="DATASET", exists=True, file_okay=False, help="Folder with dataset.json."),
 ]
-NearestFrom = Annotated[
-    list[str] | None,
+SomeDataset = Annotated[
+    Path | None,
     typer.Option(
-        "--nearest-from",
-        metavar="DATASET[:SPLIT]",
-        help="Characters that the model was trained on, for the baseline `nearest`; split train if left out; may be"
-        " given several times.",
+        "--data",
+        metavar="DATASET",
+        exists=True,
+        file_okay=False,
+        help="Data set of the characters; embedded ones if left out.",
     ),
 ]
 Folder = Annotated[

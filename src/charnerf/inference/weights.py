@@ -130,6 +130,12 @@ def load_config(folder: Path) -> DictConfig:
     return cfg
 
 
+def run_folder(weights: Path) -> Path | None:
+    """Folder of the run that a weights file or a checkpoint lies in, by its config.yaml; None outside of one."""
+    folders = (weights.parent, weights.parent.parent)
+    return next((folder for folder in folders if (folder / "config.yaml").is_file()), None)
+
+
 def _weights_of_run(folder: Path) -> Path:
     """The best weights that a run folder holds."""
     candidates = [
@@ -186,7 +192,7 @@ def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
             f"{file}: can not be read as a checkpoint ({' '.join(str(error).split())[:200]}), expected one"
             " that a run wrote."
         ) from error
-    folder = next((one for one in (file.parent, file.parent.parent) if (one / "config.yaml").is_file()), None)
+    folder = run_folder(file)
     if folder is None:
         raise DataError(
             f"{file}: no config.yaml beside it or in {file.parent.parent}; keep checkpoints in their run"

@@ -1,0 +1,96 @@
+"""The commands, and how they leave: exit status 0 done, 1 failed, 2 wrong call; errors are one message.
+
+A command's file imports what is heavy when the command runs, so that help and completion are instant.
+"""
+
+import sys
+import traceback
+from typing import Annotated
+
+import typer
+
+from charnerf.cli import (
+    bench,
+    capture,
+    card,
+    check,
+    draw,
+    evaluate,
+    finetune,
+    gallery,
+    generate,
+    mesh,
+    reconstruct,
+    report,
+    train,
+)
+from charnerf.errors import CharNeRFError, ConfigError
+from charnerf.process import limit_spinning
+
+FAILED, WRONG_CALL = 1, 2
+DEBUG_NOTE = "Exit status: 0 done, 1 failed, 2 wrong call. --debug shows the traceback of an error."
+
+app = typer.Typer(
+    name="charnerf",
+    help="Turnaround drawings (front, side, back) to a radiance field, novel views and a mesh.",
+    epilog=DEBUG_NOTE,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("train", context_settings=train.HYDRA_READS_ALL)(train.command)
+for module in (
+    reconstruct,
+    finetune,
+    gallery,
+    mesh,
+    evaluate,
+    report,
+    capture,
+    generate,
+    draw,
+    bench,
+    check,
+):
+    app.command(module.__name__.rpartition(".")[2], epilog=DEBUG_NOTE)(module.command)
+app.command("card", epilog=DEBUG_NOTE)(card.card)
+
+
+@app.callback()
+def _options(
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show the traceback of an error; also after the command.")
+    ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Turnaround drawings (front, side, back) to a radiance field, novel views and a mesh."""
+
+
+def main() -> None:
+    """Run a command and leave with its exit status."""
+    limit_spinning()
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command line and return its exit status."""
+    debug = "--debug" in arguments
+    arguments = [one for one in arguments if one != "--debug"]
+    if "--version" in arguments[:1]:
+        from charnerf import __version__
+
+        typer.echo(f"charnerf {__version__}")
+        return 0
+    try:
+        # leaves by SystemExit, also for wrong options (2) and Ctrl-C (1)
+        app(arguments, prog_name="charnerf", obj=debug)
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else FAILED if leaving.code else 0
+    except (CharNeRFError, OSError, MemoryError) as error:
+        if debug:
+            traceback.print_exc()
+        typer.echo(f"error: {error}", err=True)
+        return WRONG_CALL if isinstance(error, ConfigError) else FAILED
+    return 0

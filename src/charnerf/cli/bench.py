@@ -1,0 +1,39 @@
+"""`charnerf bench`: error against run time."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from charnerf.cli.messages import say
+from charnerf.cli.model import load_model
+from charnerf.cli.options import Device, SomeDataset, Trusted, Weights
+
+
+def command(
+    weights: Weights = None,
+    *,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Leave out the sweep of samples and tolerances.")
+    ] = False,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", dir_okay=False, help="Write all numbers there.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For the sweep's diagram.")
+    ] = Path("outputs/bench"),
+    data: SomeDataset = None,
+    split: Annotated[str, typer.Option(metavar="NAME", help="Split of the data set.")] = "test",
+    device: Device = "auto",
+    trust: Trusted = None,
+) -> None:
+    """Measure error against run time: speed-ups over a pixelNeRF-like evaluation, and what they cost."""
+    from charnerf.bench.run import run, summary
+    from charnerf.files import write_text
+
+    model = load_model(weights, device=device, trust=trust)
+    result = run(model, data=data, split=split, quick=quick, output=output, say=say)
+    if json_file is not None:
+        write_text(json_file, json.dumps(result, indent=2) + "\n")
+    typer.echo(summary(result))

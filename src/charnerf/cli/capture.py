@@ -1,0 +1,89 @@
+"""`charnerf capture`: meshes to a data set."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from charnerf.cli.messages import say
+from charnerf.cli.options import Depth, Jobs, NewDataset, Size, Sources, Views
+from charnerf.errors import DataError
+
+Meshes = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="MESH...", exists=True, help="GLB, glTF, OBJ, PLY, STL files, or folders of them."
+    ),
+]
+Split = Annotated[str, typer.Option(metavar="NAME", help="Split that gets all given characters.")]
+Up = Annotated[
+    Literal["y", "z"] | None,
+    typer.Option(help="Up axis of the files. Default: y for GLB, glTF, OBJ; z for PLY, STL."),
+]
+Facing = Annotated[
+    Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None,
+    typer.Option(help="Axis that the characters face. Default: +z for GLB, glTF, OBJ; -y for PLY, STL."),
+]
+Light = Annotated[Literal["unlit", "headlight"], typer.Option(help="Texture colours as they are, or shaded.")]
+Variants = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        help="Capture so many variants of each mesh instead of it: other proportions, other poses, NAME+1, NAME+2, ...",
+    ),
+]
+Swaps = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        help="Capture so many characters with each mesh's body and other given meshes' heads and legs: NAME+s1, ...",
+    ),
+]
+Seed = Annotated[int, typer.Option(min=0, help="The same seed gives the same variants and swaps.")]
+
+
+def command(
+    meshes: Meshes,
+    output: NewDataset,
+    *,
+    split: Split = "train",
+    views: Views = 48,
+    size: Size = 128,
+    up: Up = None,
+    facing: Facing = None,
+    sources: Sources = "orthographic",
+    light: Light = "unlit",
+    depth: Depth = False,
+    variants: Variants = 0,
+    swaps: Swaps = 0,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+) -> None:
+    """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
+
+    Every character is brought to 2 m height with its feet on the floor; its name is its file's stem, and one
+    that is in the data set already is refused. Exit status 1 if a mesh could not be captured; the others are.
+    """
+    from charnerf.capture.character import CaptureOptions
+    from charnerf.capture.dataset import capture_dataset
+    from charnerf.capture.lights import Headlight, Unlit
+    from charnerf.data.digest import split_digest
+
+    shown = Unlit() if light == "unlit" else Headlight()
+    done = capture_dataset(
+        meshes,
+        output,
+        split,
+        options=CaptureOptions(views=views, size=size, sources=sources, depth=depth, light=shown),
+        variants=variants,
+        swaps=swaps,
+        seed=seed,
+        processes=jobs,
+        up=up,
+        facing=facing,
+    )
+    say(f"{len(done.captured)} characters captured into {output}, split {split}.")
+    if done.captured:
+        say(f"{split}: digest {split_digest(output, split)}")
+    if done.failed:
+        raise DataError(f"{len(done.failed)} meshes could not be captured:\n  " + "\n  ".join(done.failed))

@@ -1,0 +1,34 @@
+"""`charnerf generate`: the embedded characters as a data set."""
+
+from typing import Annotated
+
+import typer
+
+from charnerf.cli.messages import say
+from charnerf.cli.options import Jobs, NewDataset, Size, Views
+from charnerf.errors import ConfigError
+
+
+def command(
+    output: NewDataset,
+    *,
+    train: Annotated[int, typer.Option(min=0, help="Characters of the train split.")] = 32,
+    val: Annotated[int, typer.Option(min=0, help="Characters of the val split.")] = 4,
+    test: Annotated[int, typer.Option(min=0, help="Characters of the test split.")] = 6,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same characters.")] = 0,
+    views: Views = 48,
+    size: Size = 128,
+    jobs: Jobs = None,
+) -> None:
+    """Write the embedded characters of `data=procedural` as a data set."""
+    from charnerf.capture.procedural_data import generate_dataset
+    from charnerf.data.digest import split_digest
+    from charnerf.data.layout import read_dataset
+
+    if train + val + test == 0:
+        raise ConfigError("--train, --val, --test: found 0 each, expected at least one character.")
+    generate_dataset(output, train, val, test, seed, views=views, size=size, processes=jobs)
+    say(f"{train + val + test} characters are in {output}.")
+    for split, members in read_dataset(output).splits.items():
+        if members:
+            say(f"{split}: {len(members)} characters, digest {split_digest(output, split)}")

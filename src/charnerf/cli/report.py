@@ -1,0 +1,35 @@
+"""`charnerf report`: the report of a run, or over all runs below a folder."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from charnerf.cli.messages import say
+from charnerf.cli.options import Trusted
+
+
+def command(
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="FOLDER", exists=True, file_okay=False, help="A run, or runs lie below it."),
+    ],
+    *,
+    drawings: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            exists=True,
+            file_okay=False,
+            help="Show these drawings in every row: NAME/front.png, side.png, back.png, or pictures of fronts.",
+        ),
+    ] = None,
+    trust: Trusted = None,
+) -> None:
+    """Write FOLDER/report.md and FOLDER/report.html: of a run, or over all runs below a folder.
+
+    Runs that differ in their seed alone are one row. Interactive diagrams need plotly (the extra `report`).
+    """
+    from charnerf.reporting.folder_report import report
+
+    say(f"report: {report(folder, drawings=drawings, trusted=trust or ())}")

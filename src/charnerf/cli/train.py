@@ -1,0 +1,94 @@
+"""`charnerf train` and `python train.py`: one door, a run or with -m a grid; Hydra reads its arguments."""
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from charnerf.process import keep_freed_memory, limit_spinning, use_fastest_products
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+HYDRA_READS_ALL = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+
+
+def command(context: typer.Context) -> None:
+    """Train a run, or a grid: [group=option ...] [key=value ...] [-m]; its --help lists groups and keys.
+
+    The same grid typed again skips its finished cells and goes on with the others.
+    """
+    if context.obj:  # --debug
+        os.environ["HYDRA_FULL_ERROR"] = "1"
+    raise typer.Exit(main(context.args))
+
+
+def main(arguments: Sequence[str], *, conf: Path | None = None) -> int:
+    """Train a run, or a grid.
+
+    Args:
+        arguments: Hydra's.
+        conf: Folder of the config files; the package's own if None.
+
+    Returns:
+        Exit status: 0 done, 1 failed, 2 wrong call. HYDRA_FULL_ERROR=1 shows tracebacks.
+    """
+    limit_spinning()
+    from charnerf.config.composition import run_door
+    from charnerf.config.options import conf_folder
+
+    folder = (conf or conf_folder()).resolve()
+    return run_door(lambda: _train(list(arguments), folder), arguments=arguments, conf=folder)
+
+
+def _train(arguments: list[str], conf: Path) -> None:
+    """Train a run; or a grid, and report over it, also if some of its cells failed."""
+    import hydra
+
+    from charnerf.config.grid import grid_command
+    from charnerf.errors import GridError
+    from charnerf.training.grid import begin_grid, check_grid, is_lost_worker, report_grid
+
+    train = hydra.main(version_base="1.3", config_path=str(conf), config_name="train")(run_job)
+    grid = grid_command(arguments)
+    sys.argv[1:] = arguments if grid is None else grid.arguments  # where Hydra reads them
+    if grid is None:
+        train()
+        return
+    since = begin_grid(grid.folder)
+    try:
+        train()
+    except Exception as error:
+        if is_lost_worker(error):
+            raise GridError(
+                f"{grid.folder}: a process of the launcher was killed, which ended the others, expected all to live; was there"
+                " memory enough? The same command goes on with what is not done."
+            ) from error
+        raise
+    finally:
+        report_grid(grid.folder)
+    check_grid(grid.folder, since=since)
+
+
+def run_job(cfg: "DictConfig") -> None:
+    """One job, perhaps in a process that a launcher began: training, evaluation, report."""
+    keep_freed_memory()
+    use_fastest_products()
+    from hydra.core.hydra_config import HydraConfig
+    from hydra.types import RunMode
+
+    from charnerf.config import validate
+    from charnerf.config.composition import trusted_by
+    from charnerf.training.cells import run_cell
+    from charnerf.training.run import run_training
+
+    job = HydraConfig.get()
+    validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
+    folder = Path(job.runtime.output_dir)
+    if job.mode is RunMode.MULTIRUN:
+        run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder)
+    else:
+        run_training(cfg, folder)
