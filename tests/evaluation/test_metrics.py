@@ -7,8 +7,9 @@ from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from charnerf.errors import DataError, NumericalError, ShapeError
 from charnerf.evaluation import metrics
+from charnerf.evaluation.lpips import Lpips
 
-PICTURE_METRICS = (metrics.psnr, metrics.ssim, metrics.flip, metrics.lpips)
+PICTURE_METRICS = (metrics.psnr, metrics.ssim, metrics.flip, Lpips())
 
 
 @pytest.fixture
@@ -81,7 +82,8 @@ def test_flip_is_zero_for_equal_pictures_and_grows_with_the_error(pair):
 
 
 def test_lpips_is_a_number_or_null_with_a_reason(pair):
-    value, reason = metrics.lpips(*pair)
+    lpips = Lpips()
+    value, reason = lpips(*pair), lpips.reason
     assert (value is None) != (reason is None)
     assert reason is None or "LPIPS needs" in reason
 
@@ -116,22 +118,22 @@ def ball(radius: float, count: int) -> np.ndarray:
 def test_chamfer_and_f_score_of_two_spheres():
     """Concentric spheres 30 mm apart: so is every point, up to the spacing of the points."""
     inner, outer = ball(0.5, 20_000), ball(0.53, 20_000)
-    assert metrics.chamfer_mm(inner, outer) == pytest.approx(30.0, abs=1.0)
-    assert metrics.f_score(inner, outer) == 0.0
-    assert metrics.f_score(inner, outer, radius=0.04) == 1.0
+    assert metrics.chamfer_mm(*metrics.surface_distances(inner, outer)) == pytest.approx(30.0, abs=1.0)
+    assert metrics.f_score(*metrics.surface_distances(inner, outer)) == 0.0
+    assert metrics.f_score(*metrics.surface_distances(inner, outer), radius=0.04) == 1.0
 
 
 def test_chamfer_and_f_score_by_hand():
     """One of two predicted points is 1 m off; all true points are found: precision 1/2, recall 1."""
     true = np.zeros((1, 3))
     predicted = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    assert metrics.chamfer_mm(predicted, true) == pytest.approx(250.0)
-    assert metrics.f_score(predicted, true) == pytest.approx(2.0 / 3.0)
+    assert metrics.chamfer_mm(*metrics.surface_distances(predicted, true)) == pytest.approx(250.0)
+    assert metrics.f_score(*metrics.surface_distances(predicted, true)) == pytest.approx(2.0 / 3.0)
 
 
 def test_points_that_are_none_or_not_finite_are_refused():
     points = np.zeros((4, 3))
     with pytest.raises(NumericalError, match="predicted"):
-        metrics.chamfer_mm(np.full((4, 3), np.nan), points)
+        metrics.surface_distances(np.full((4, 3), np.nan), points)
     with pytest.raises(ShapeError, match="true"):
-        metrics.f_score(points, np.zeros((0, 3)))
+        metrics.surface_distances(points, np.zeros((0, 3)))

@@ -64,6 +64,10 @@ class _Inputs:
     source_dirs: Tensor
     valid: Tensor
 
+    def mean_parts(self, combinator: ViewAttention) -> tuple[Tensor, Tensor, Tensor]:
+        """What the combinator does at them, see `mean_parts`."""
+        return mean_parts(combinator.logits(self.view_features, self.view_dirs, self.source_dirs), self.valid)
+
 
 def mean_parts(logits: AttentionLogits, valid: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Means over points (P), rows and keys of both parts, (K,) each, and of the weights over points and rows, (K, V)."""
@@ -118,11 +122,8 @@ def attention_profile(
             _seen(combinator, scene, renderer, camera, one.name)
             for scene, one in zip(scenes, characters, strict=True)
         ]
-        parts = [
-            mean_parts(combinator.logits(one.view_features, one.view_dirs, one.source_dirs), one.valid)
-            for one in inputs
-        ]
-        means.append([torch.stack(part).mean(0).cpu() for part in zip(*parts, strict=True)])
+        parts = zip(*(one.mean_parts(combinator) for one in inputs), strict=True)
+        means.append([torch.stack(part).mean(0).cpu() for part in parts])
         num_points += sum(len(one.valid) for one in inputs)
     num_views = means[0][2].shape[-1]
     factor = float(combinator.scale * combinator.view_scale.square() / num_views)

@@ -11,6 +11,7 @@ from charnerf.data.characters import Character
 from charnerf.errors import CharNeRFError
 from charnerf.evaluation.angles import view_angles
 from charnerf.evaluation.baselines import VisualHullBaseline, white_prediction
+from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.nearest import (
     NO_MATCH,
     NO_TRAINING_SET,
@@ -75,6 +76,7 @@ def measure_character(
     mesh: MakeMesh | None = None,
     baselines: bool = True,
     training: TrainingCharacters | None = None,
+    lpips: Lpips | None = None,
     on_picture: Callable[[], object] = lambda: None,
 ) -> CharacterResult:
     """Measure a model on a character: every metric of every frame, of the surface, seconds and memory.
@@ -87,6 +89,7 @@ def measure_character(
         mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them out.
         baselines: Whether to measure `white`, `visual_hull` and `nearest` too.
         training: Characters that the model was trained on, for the baseline `nearest`; None leaves it out.
+        lpips: Loaded here if not given.
         on_picture: Called after every picture of ours.
 
     Raises:
@@ -100,7 +103,7 @@ def measure_character(
             answers["visual_hull"] = _visual_hull(character, frames, watch)
         if nearest is not None:
             answers["nearest"] = _nearest(nearest, character, frames)
-    scores = _scores(answers, character, frames)
+    scores = _scores(answers, character, frames, lpips or Lpips())
     if baselines and nearest is None:
         scores["nearest"] = missing_scores(NO_TRAINING_SET if training is None else NO_MATCH)
     return CharacterResult(
@@ -168,7 +171,7 @@ def _nearest(nearest: Nearest, character: Character, frames: Sequence[int]) -> _
 
 
 def _scores(
-    answers: Mapping[str, _Answer], character: Character, frames: Sequence[int]
+    answers: Mapping[str, _Answer], character: Character, frames: Sequence[int], lpips: Lpips
 ) -> dict[str, MethodScores]:
     """Every metric of every method."""
     truth = None if character.mesh_file is None else true_points(character.mesh_file)
@@ -176,7 +179,7 @@ def _scores(
     angles = view_angles(character.cameras[list(frames)], character.sources).records()
     scores = {}
     for method, answer in answers.items():
-        views, reasons = score_views(answer.pictures, images)
+        views, reasons = score_views(answer.pictures, images, lpips)
         views = [{**metrics, **angle} for metrics, angle in zip(views, angles, strict=True)]
         surface, missing = _surface_scores(answer.surface, truth, character)
         scores[method] = MethodScores(views, surface, {**reasons, **missing})

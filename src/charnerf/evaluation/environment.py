@@ -47,10 +47,11 @@ def _processor() -> str:
 def environment(device: torch.device) -> dict[str, Any]:
     """What a reader needs to compare seconds: device, torch, commit (or null and why), threads, machine."""
     name = torch.cuda.get_device_name(device) if device.type == "cuda" else str(device)
-    found: dict[str, Any] = {"device": name, "torch": torch.__version__, "commit": commit()}
-    if found["commit"] is None:
-        found["commit_reason"] = _UNKNOWN_COMMIT
-    found["threads"] = torch.get_num_threads()
-    found["machine"] = f"{_processor()}, {platform.system()} {platform.machine()}"
-    found["python"] = platform.python_version()
-    return found
+    facts: dict[str, Any] = {"device": name, "torch": torch.__version__, "commit": commit()}
+    if facts["commit"] is None:
+        facts["commit_reason"] = _UNKNOWN_COMMIT
+    return facts | {
+        "threads": torch.get_num_threads(),
+        "machine": f"{_processor()}, {platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+    }

@@ -11,6 +11,7 @@ from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.character import MakeMesh, measure_character
 from charnerf.evaluation.frames import fixed_views
+from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.metrics_file import VIEWS_FILE, split_metrics, write_views
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.evaluation.pictures import save_pictures
@@ -32,7 +33,7 @@ def evaluate(
     train_seconds: float | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
-    """Measure a model on a split.
+    """Measure a model on a split; returns the content of metrics.json.
 
     Args:
         network: In eval mode.
@@ -40,22 +41,21 @@ def evaluate(
         root: Folder of the data set.
         split: Which of its splits.
         views: Fixed views a character, evenly chosen among its frames, or "all".
-        output: Folder for the predictions, `images/NAME/000.png` (RGBA, named like the data set's), one contact
-            sheet a character, `images/NAME/sheet.png`, and every view's metrics, `views.csv`; None keeps none.
+        output: Folder for every view's metrics, `views.csv`, and in `images/NAME/` the predictions (RGBA, named like the data
+            set's pictures) and a contact sheet, `sheet.png`; None keeps none.
         mesh: As `measure_character` takes it; without it figures of surfaces are null.
         baselines: As `measure_character` takes it.
         training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
         progress: Whether to draw a progress bar with the time left.
 
-    Returns:
-        The content of metrics.json.
-
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
         NumericalError: If a prediction is not finite; the message names the picture.
     """
-    measure = partial(measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training)
+    measure = partial(
+        measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training, lpips=Lpips()
+    )
     names = names_of(read_dataset(root), split)
     results = []
     with tqdm(total=0, desc=f"evaluate {split}", unit="view", disable=not progress) as bar:
@@ -69,5 +69,4 @@ def evaluate(
             results.append(replace(result, pictures={}))  # of one character at a time: they take memory
     if output is not None:
         write_views(output / VIEWS_FILE, results)
-    metrics = split_metrics(results, split=split, device=network.device, train_seconds=train_seconds)
-    return {**metrics, "data_root": str(Path(root).resolve())}
+    return split_metrics(results, root, split, device=network.device, train_seconds=train_seconds)

@@ -5,10 +5,6 @@ point sets (N, 3), m. A picture of bytes is refused, NaN is refused: a metric of
 that means nothing.
 """
 
-from collections.abc import Callable
-from functools import cache
-from pathlib import Path
-
 import numpy as np
 import torch
 from scipy.spatial import cKDTree
@@ -24,8 +20,6 @@ F_SCORE_RADIUS_M = 0.02
 """Distance within which a surface point counts as found."""
 MIN_SQUARED_ERROR = 1e-10
 """Mean squared errors below this count as this: equal pictures have 100 dB, so that means stay finite."""
-
-_LPIPS_WEIGHTS = "vgg16-397923af.pth"
 
 
 def check_unit_range(name: str, picture: Tensor) -> None:
@@ -44,7 +38,14 @@ def check_unit_range(name: str, picture: Tensor) -> None:
         raise DataError(f"{name}: found values from {low:g} to {high:g}, expected the range [0, 1]{hint}.")
 
 
-def _check_pair(prediction: Tensor, truth: Tensor) -> None:
+def check_pair(prediction: Tensor, truth: Tensor) -> None:
+    """Check that two pictures (H, W, 3) can be compared.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+    """
     check_last_dim("prediction", prediction, 3)
     check_same_shape("prediction", prediction, "truth", truth)
     check_unit_range("prediction", prediction)
@@ -63,7 +64,7 @@ def psnr(prediction: Tensor, truth: Tensor) -> float:
         NumericalError: If values are not finite.
         ShapeError: If the shapes differ.
     """
-    _check_pair(prediction, truth)
+    check_pair(prediction, truth)
     return _decibels((prediction.double() - truth.double()).square())
 
 
@@ -77,7 +78,7 @@ def psnr_foreground(prediction: Tensor, truth: Tensor, true_alpha: Tensor) -> fl
         NumericalError: If values are not finite.
         ShapeError: If the shapes differ.
     """
-    _check_pair(prediction, truth)
+    check_pair(prediction, truth)
     check_unit_range("true_alpha", true_alpha)
     inside = true_alpha > FOREGROUND_ALPHA
     check_same_shape("true_alpha", true_alpha, "truth[..., 0]", truth[..., 0])
@@ -96,7 +97,7 @@ def ssim(prediction: Tensor, truth: Tensor) -> float:
 
     Source: Wang 2004; torchmetrics.
     """
-    _check_pair(prediction, truth)
+    check_pair(prediction, truth)
     pictures = [picture.float().movedim(-1, 0)[None].contiguous() for picture in (prediction, truth)]
     value = structural_similarity_index_measure(pictures[0], pictures[1], data_range=1.0)
     assert isinstance(value, Tensor)
@@ -115,7 +116,7 @@ def flip(prediction: Tensor, truth: Tensor) -> float:
     """
     from flip_evaluator import evaluate
 
-    _check_pair(prediction, truth)
+    check_pair(prediction, truth)
     test, reference = (
         np.ascontiguousarray(picture.detach().clamp(0.0, 1.0).cpu().numpy(), dtype=np.float32)
         for picture in (prediction, truth)
@@ -134,51 +135,9 @@ def silhouette_iou(opacity: Tensor, true_alpha: Tensor) -> float:
     check_same_shape("opacity", opacity, "true_alpha", true_alpha)
     check_unit_range("opacity", opacity)
     check_unit_range("true_alpha", true_alpha)
-    found, true = opacity > FOREGROUND_ALPHA, true_alpha > FOREGROUND_ALPHA
-    union = int((found | true).sum())
-    return int((found & true).sum()) / union if union else 1.0
-
-
-@cache
-def lpips_network() -> tuple[Callable[[Tensor, Tensor], Tensor] | None, str | None]:
-    """The network of LPIPS, if it can be had without a download: (network, None) or (None, reason)."""
-    weights = Path(torch.hub.get_dir()) / "checkpoints" / _LPIPS_WEIGHTS
-    try:
-        import torchvision  # noqa: F401
-    except (ImportError, RuntimeError) as error:
-        return (
-            None,
-            f"LPIPS needs torchvision, which does not import here ({error}); install it beside this torch",
-        )
-    if not weights.is_file():
-        return None, (
-            f"LPIPS needs the VGG-16 weights {_LPIPS_WEIGHTS} in torch's hub folder (checkpoints/), and "
-            "nothing is downloaded unasked: fetch them once by torchvision.models.vgg16(weights='DEFAULT')"
-        )
-    from torchmetrics.image.lpip import LearnedPerceptualImagePatchSimilarity
-
-    return LearnedPerceptualImagePatchSimilarity(net_type="vgg", normalize=True).eval(), None
-
-
-def lpips(prediction: Tensor, truth: Tensor) -> tuple[float | None, str | None]:
-    """Learned perceptual distance (VGG), or None and the reason why it could not be had.
-
-    Raises:
-        DataError: If values leave [0, 1].
-        NumericalError: If values are not finite.
-        ShapeError: If the shapes differ.
-
-    Source: Zhang 2018; torchmetrics (its linear weights), torchvision (the network).
-    """
-    _check_pair(prediction, truth)
-    network, reason = lpips_network()
-    if network is None:
-        return None, reason
-    pictures = [
-        picture.detach().cpu().float().clamp(0.0, 1.0).movedim(-1, 0)[None] for picture in (prediction, truth)
-    ]
-    with torch.no_grad():
-        return float(network(pictures[0], pictures[1])), None
+    predicted, true = opacity > FOREGROUND_ALPHA, true_alpha > FOREGROUND_ALPHA
+    union = int((predicted | true).sum())
+    return int((predicted & true).sum()) / union if union else 1.0
 
 
 def surface_distances(predicted: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -195,35 +154,16 @@ def surface_distances(predicted: np.ndarray, true: np.ndarray) -> tuple[np.ndarr
     return cKDTree(true).query(predicted)[0], cKDTree(predicted).query(true)[0]
 
 
-def chamfer_mm(predicted: np.ndarray, true: np.ndarray) -> float:
-    """Mean of the two mean distances between point sets (N, 3) and (M, 3) given in m; mm.
-
-    Raises:
-        NumericalError: If a coordinate is not finite.
-        ShapeError: If a set is empty or not (N, 3).
-    """
-    return chamfer_of_distances(*surface_distances(predicted, true))
-
-
-def f_score(predicted: np.ndarray, true: np.ndarray, radius: float = F_SCORE_RADIUS_M) -> float:
-    """Harmonic mean of the shares of points (N, 3), (M, 3) that the other set has within the radius, m.
-
-    Raises:
-        NumericalError: If a coordinate is not finite.
-        ShapeError: If a set is empty or not (N, 3).
-
-    Source: Knapitsch 2017 (Tanks and Temples).
-    """
-    return f_score_of_distances(*surface_distances(predicted, true), radius=radius)
-
-
-def chamfer_of_distances(there: np.ndarray, back: np.ndarray) -> float:
-    """Chamfer distance, mm, of the two answers (N,), (M,) of `surface_distances`."""
+def chamfer_mm(there: np.ndarray, back: np.ndarray) -> float:
+    """Mean of the two mean distances (N,), (M,) of `surface_distances`, given in m; mm."""
     return float(1000.0 * 0.5 * (there.mean() + back.mean()))
 
 
-def f_score_of_distances(there: np.ndarray, back: np.ndarray, *, radius: float = F_SCORE_RADIUS_M) -> float:
-    """F-score of the two answers (N,), (M,) of `surface_distances`."""
+def f_score(there: np.ndarray, back: np.ndarray, *, radius: float = F_SCORE_RADIUS_M) -> float:
+    """Harmonic mean of the shares of the distances (N,), (M,) of `surface_distances` that are within the radius, m.
+
+    Source: Knapitsch 2017 (Tanks and Temples).
+    """
     precision, recall = float((there <= radius).mean()), float((back <= radius).mean())
     total = precision + recall
     return 2.0 * precision * recall / total if total else 0.0

@@ -22,7 +22,12 @@ VIEWS_FILE = "views.csv"
 
 
 def split_metrics(
-    results: Sequence[CharacterResult], *, split: str, device: torch.device, train_seconds: float | None
+    results: Sequence[CharacterResult],
+    root: str | Path,
+    split: str,
+    *,
+    device: torch.device,
+    train_seconds: float | None,
 ) -> dict[str, Any]:
     """All numbers of a split in the form of metrics.json."""
     ours = [result.scores[OURS] for result in results]
@@ -44,29 +49,30 @@ def split_metrics(
         **_memory(results, device),
         "left_out": _left_out(sum((result.left_out for result in results), LeftOut())),
         "environment": environment(device),
+        "data_root": str(Path(root).resolve()),
     }
 
 
 def _baselines(results: Sequence[CharacterResult]) -> dict[str, Any]:
     """Every metric of the baselines; the hull's seconds, and which training characters were nearest."""
-    found: dict[str, Any] = {}
+    baselines: dict[str, Any] = {}
     for method in results[0].scores:
         if method != OURS:
             scores = [result.scores[method] for result in results]
             by_angle = by_azimuth([each.views for each in scores], VIEW_KEYS)
-            found[method] = {**summarize(scores), "by_azimuth": by_angle}
-    if "nearest" in found:
-        found["nearest"]["found"] = {
+            baselines[method] = {**summarize(scores), "by_azimuth": by_angle}
+    if "nearest" in baselines:
+        baselines["nearest"]["found"] = {
             result.name: {"character": near.name, "silhouette_iou_of_sources": near.iou}
             for result in results
             if (near := result.nearest) is not None
         }
-    if "visual_hull" in found:
-        found["visual_hull"]["seconds"] = {
+    if "visual_hull" in baselines:
+        baselines["visual_hull"]["seconds"] = {
             "encode": _median_seconds(results, "hull_encode"),
             "render_per_frame": _median_seconds(results, "hull_render"),
         }
-    return found
+    return baselines
 
 
 def _seconds(results: Sequence[CharacterResult], train_seconds: float | None) -> dict[str, Any]:
@@ -101,12 +107,9 @@ def _memory(results: Sequence[CharacterResult], device: torch.device) -> dict[st
 
 def _left_out(left_out: LeftOut) -> dict[str, Any]:
     """Shares left out; null with the reason where there was nothing of the kind."""
-    shares: dict[str, Any] = dict(left_out.shares())
-    return shares | {
-        f"{key}_reason": "nothing of the kind was counted"
-        for key, share in left_out.shares().items()
-        if share is None
-    }
+    shares = left_out.shares()
+    missing = [key for key, share in shares.items() if share is None]
+    return {**shares, **{f"{key}_reason": "nothing of the kind was counted" for key in missing}}
 
 
 def write_metrics(path: str | Path, metrics: Mapping[str, Any]) -> None:

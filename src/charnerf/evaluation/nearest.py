@@ -87,12 +87,12 @@ class TrainingCharacters:
         own = _packed_masks(character.sources)
         common = _POPCOUNT[masks & own].sum(axis=-1, dtype=np.int64)
         either = _POPCOUNT[masks | own].sum(axis=-1, dtype=np.int64)
-        found = (common / np.maximum(either, 1)).mean(axis=-1)
+        overlaps = (common / np.maximum(either, 1)).mean(axis=-1)
         folders = [self._folders[index] for index in self._members[character.source_names]]
         itself = character.folder.resolve()
         return {
             folder: float(iou)
-            for folder, iou in zip(folders, found, strict=True)
+            for folder, iou in zip(folders, overlaps, strict=True)
             if folder.resolve() != itself
         }
 
@@ -119,13 +119,13 @@ class NearestBaseline:
     Parts that a material cuts out by alpha are drawn whole.
 
     Args:
-        found: The training character.
+        nearest: The training character.
         sources: The drawings, B = 1; absent and mirrored views are not used.
     """
 
-    def __init__(self, found: Nearest, sources: SourceViews) -> None:
+    def __init__(self, nearest: Nearest, sources: SourceViews) -> None:
         cameras, images = used_drawings(sources)
-        self._projected = ProjectedMesh(np.asarray(found.mesh.triangles), cameras, filled_drawings(images))
+        self._projected = ProjectedMesh(np.asarray(nearest.mesh.triangles), cameras, filled_drawings(images))
 
     def render(self, camera: Cameras) -> RenderOutput:
         """Picture of a camera of shape (): fields (H, W), on white."""

@@ -10,11 +10,12 @@ from torch import Tensor
 from charnerf.checks import check_finite
 from charnerf.evaluation import metrics
 from charnerf.evaluation.angles import Record, mean_of, mean_over_characters
+from charnerf.evaluation.lpips import Lpips
+from charnerf.evaluation.surface_error import SURFACE_KEYS
 from charnerf.pictures import on_white
 from charnerf.types import RenderOutput
 
 VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou")
-SURFACE_KEYS = ("chamfer_mm", "f_score")
 METRIC_KEYS = VIEW_KEYS + SURFACE_KEYS
 
 
@@ -51,27 +52,23 @@ def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
 
 
 def score_views(
-    predictions: Sequence[RenderOutput], images: Tensor
+    predictions: Sequence[RenderOutput], images: Tensor, lpips: Lpips
 ) -> tuple[list[dict[str, float | None]], dict[str, str]]:
     """VIEW_KEYS of predictions against the true bytes (n, H, W, 4), and why a key is missing."""
-    reasons: dict[str, str] = {}
-    return [_score_view(*pair, reasons) for pair in zip(predictions, images, strict=True)], reasons
+    scores = [_score_view(*pair, lpips) for pair in zip(predictions, images, strict=True)]
+    reasons = {"lpips": lpips.reason, "psnr_foreground": "no pixel has a true alpha above 0.5"}
+    missing = {key for each in scores for key, value in each.items() if value is None}
+    return scores, {key: str(reason) for key, reason in reasons.items() if key in missing}
 
 
-def _score_view(prediction: RenderOutput, image: Tensor, reasons: dict[str, str]) -> dict[str, float | None]:
+def _score_view(prediction: RenderOutput, image: Tensor, lpips: Lpips) -> dict[str, float | None]:
     rgba = image.float() / 255.0
     truth, alpha = on_white(rgba), rgba[..., 3]
-    perceptual, why = metrics.lpips(prediction.rgb, truth)
-    if why is not None:
-        reasons["lpips"] = why
-    foreground = metrics.psnr_foreground(prediction.rgb, truth, alpha)
-    if foreground is None:
-        reasons["psnr_foreground"] = "no pixel has a true alpha above 0.5"
     return {
         "psnr": metrics.psnr(prediction.rgb, truth),
-        "psnr_foreground": foreground,
+        "psnr_foreground": metrics.psnr_foreground(prediction.rgb, truth, alpha),
         "ssim": metrics.ssim(prediction.rgb, truth),
-        "lpips": perceptual,
+        "lpips": lpips(prediction.rgb, truth),
         "flip": metrics.flip(prediction.rgb, truth),
         "silhouette_iou": metrics.silhouette_iou(prediction.opacity, alpha),
     }
@@ -79,12 +76,12 @@ def _score_view(prediction: RenderOutput, image: Tensor, reasons: dict[str, str]
 
 def summarize(characters: Sequence[MethodScores]) -> dict[str, Any]:
     """Means over a character's views, then over characters; null with `<key>_reason` where there is none."""
-    found: dict[str, Any] = mean_over_characters([scores.views for scores in characters], VIEW_KEYS)
-    found |= mean_of([scores.surface for scores in characters], SURFACE_KEYS)
+    means = mean_over_characters([scores.views for scores in characters], VIEW_KEYS)
+    means |= mean_of([scores.surface for scores in characters], SURFACE_KEYS)
     summary: dict[str, Any] = {}
-    for key in METRIC_KEYS:
-        summary[key] = found[key]
-        if found[key] is None:
+    for key, mean in means.items():
+        summary[key] = mean
+        if mean is None:
             reasons = [scores.reasons[key] for scores in characters if key in scores.reasons]
             summary[f"{key}_reason"] = reasons[0] if reasons else "no view was evaluated"
     return summary

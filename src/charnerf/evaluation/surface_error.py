@@ -9,14 +9,14 @@ import trimesh
 from charnerf.data.surface import AreaSurface, visible_surface_points
 from charnerf.data.visibility import see_points
 from charnerf.errors import DataError
-from charnerf.evaluation.metrics import chamfer_of_distances, f_score_of_distances, surface_distances
+from charnerf.evaluation.metrics import chamfer_mm, f_score, surface_distances
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import interpolate
 from charnerf.types import Cameras
 
 NUM_POINTS = 50_000
 """Points a surface: their spacing alone puts equal surfaces of 2 square metres about 3 mm apart."""
-_SURFACE_KEYS = ("chamfer_mm", "f_score")
+SURFACE_KEYS = ("chamfer_mm", "f_score")
 
 
 def true_points(mesh_file: Path, *, seed: int = 0) -> np.ndarray:
@@ -68,13 +68,10 @@ def surface_scores(
         points = seen_points(mesh, cameras)
     except DataError as error:
         return missing_surface(str(error))
-    there, back = surface_distances(points, truth)
-    return {
-        "chamfer_mm": chamfer_of_distances(there, back),
-        "f_score": f_score_of_distances(there, back),
-    }, {}
+    distances = surface_distances(points, truth)
+    return {"chamfer_mm": chamfer_mm(*distances), "f_score": f_score(*distances)}, {}
 
 
 def missing_surface(reason: str) -> tuple[dict[str, float | None], dict[str, str]]:
     """The scores of a surface that could not be had, with the reason."""
-    return dict.fromkeys(_SURFACE_KEYS, None), dict.fromkeys(_SURFACE_KEYS, reason)
+    return dict.fromkeys(SURFACE_KEYS, None), dict.fromkeys(SURFACE_KEYS, reason)

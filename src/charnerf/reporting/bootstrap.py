@@ -120,7 +120,7 @@ def compare_rows(
     Returns:
         Differences of pairs that share a character, the better row first.
     """
-    found = []
+    differences = []
     for first, second in combinations(scores, 2) if pairs is None else pairs:
         shared = [name for name in scores[first] if name in scores[second]]
         if not shared:
@@ -128,6 +128,8 @@ def compare_rows(
         values = np.array([scores[first][name] - scores[second][name] for name in shared])
         better, other = (first, second) if values.mean() >= 0.0 else (second, first)
         sign = 1.0 if better == first else -1.0
-        found.append(paired_bootstrap(sign * values, names=(better, other), resamples=resamples, seed=seed))
-    corrected = holm([one.p_value for one in found])
-    return [replace(one, p_value=p_value) for one, p_value in zip(found, corrected, strict=True)]
+        differences.append(
+            paired_bootstrap(sign * values, names=(better, other), resamples=resamples, seed=seed)
+        )
+    corrected = holm([one.p_value for one in differences])
+    return [replace(one, p_value=p_value) for one, p_value in zip(differences, corrected, strict=True)]
