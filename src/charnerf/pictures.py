@@ -1,4 +1,4 @@
-"""Colours with alpha put on white, colours as bytes, and PNG files."""
+"""Pictures: on white, as bytes, read between pixels, and PNG files."""
 
 from pathlib import Path
 from typing import TypeVar
@@ -6,6 +6,7 @@ from typing import TypeVar
 import numpy as np
 import torch
 from PIL import Image
+from scipy import ndimage
 from torch import Tensor
 
 from charnerf.files import write_aside
@@ -32,6 +33,16 @@ def bytes_on_white(rgba: np.ndarray) -> np.ndarray:
 def to_bytes(values: Tensor | np.ndarray) -> np.ndarray:
     """Numbers in [0, 1] as bytes of the same shape; what lies outside is clamped."""
     return (torch.as_tensor(values).detach().clamp(0.0, 1.0) * 255.0).round().to(torch.uint8).cpu().numpy()
+
+
+def read_bilinear(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Values (K, C) of a picture (H, W, C) at positions (K, 2), x right and y down, between pixel centres; the edge's beyond it."""
+    at = np.stack((pixels[:, 1], pixels[:, 0])) - 0.5
+    channels = [
+        ndimage.map_coordinates(channel, at, order=1, mode="nearest")
+        for channel in np.moveaxis(picture, -1, 0)
+    ]
+    return np.stack(channels, axis=1)
 
 
 def save_png(path: Path, picture: Image.Image) -> None:

@@ -11,8 +11,8 @@ from charnerf.errors import DataError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing import atlas as atlas_module
 from charnerf.meshing.atlas import rasterise, unwrap
+from charnerf.meshing.exported import exported, read_texture, texture_picture, welded
 from charnerf.meshing.extract import fit_height
-from charnerf.meshing.parts import parts_of, read_texture, texture_picture, welded
 from charnerf.meshing.projection import Projector
 from charnerf.meshing.texture import padded_picture, texture_mesh
 from charnerf.types import SourceViews
@@ -66,7 +66,7 @@ def _grey_scene():
 
 def _colour_at(mesh: trimesh.Trimesh, directions) -> np.ndarray:
     """Texture colours (n, 3) where rays from the ball's centre leave it, by the nearest vertices."""
-    parts = welded(parts_of(mesh, ".ply", "x"))
+    parts = welded(exported(mesh, ".ply", "x"))
     wanted = np.array((0.0, 0.0, 1.0)) + 0.8 * np.asarray(directions)
     near = np.linalg.norm(parts.vertices[None] - wanted[:, None], axis=-1).argmin(1)
     return parts.rgba[near, :3]
@@ -93,7 +93,7 @@ def test_an_atlas_keeps_triangles_apart_and_in_order(monkeypatch):
 def test_texturing_moves_no_surface_and_no_normal():
     mesh = _ball()
     done = texture_mesh(_grey_scene(), mesh, _views(_plain), size=128)
-    joined = welded(parts_of(fit_height(done.mesh, 1.6), ".ply", "x"))
+    joined = welded(exported(fit_height(done.mesh, 1.6), ".ply", "x"))
     back = trimesh.Trimesh(joined.vertices, joined.faces, process=False)
     assert back.is_watertight and back.euler_number == 2
     assert len(back.vertices) == len(mesh.vertices) < len(done.mesh.vertices)

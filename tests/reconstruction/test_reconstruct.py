@@ -17,8 +17,8 @@ from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.hull import build_hull
 from charnerf.inference.hero import Hero
+from charnerf.meshing.exported import read_texture
 from charnerf.meshing.options import MeshOptions
-from charnerf.meshing.parts import read_texture
 from charnerf.reconstruction.folder import reconstruct
 from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.scene import FunctionField, Scene

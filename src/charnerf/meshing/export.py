@@ -7,9 +7,9 @@ import trimesh
 
 from charnerf.errors import DataError
 from charnerf.files import write_bytes
+from charnerf.meshing.exported import ExportedMesh, exported, welded
 from charnerf.meshing.gltf import encode_glb, encode_gltf
 from charnerf.meshing.obj import encode_obj
-from charnerf.meshing.parts import MeshParts, parts_of, welded
 from charnerf.meshing.usd import encode_usdz
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usdz")
@@ -48,7 +48,7 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:
         raise DataError(f"{path}: found a mesh without faces, expected a surface to write.")
     if not np.isfinite(mesh.vertices).all():
         raise DataError(f"{path}: found vertices that are not finite, expected finite positions in metres.")
-    files = _encode(parts_of(mesh, suffix, path.stem), suffix)
+    files = _encode(exported(mesh, suffix, path.stem), suffix)
     for other, content in files.items():
         if other != suffix:
             write_bytes(path.with_suffix(other), content)
@@ -56,17 +56,17 @@ def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:
     return path
 
 
-def _encode(parts: MeshParts, suffix: str) -> dict[str, bytes]:
+def _encode(mesh: ExportedMesh, suffix: str) -> dict[str, bytes]:
     """The files by suffix."""
     if suffix == ".glb":
-        return {suffix: encode_glb(parts)}
+        return {suffix: encode_glb(mesh)}
     if suffix == ".gltf":
-        return {suffix: encode_gltf(parts)}
+        return {suffix: encode_gltf(mesh)}
     if suffix == ".usdz":
-        return {suffix: encode_usdz(parts)}
+        return {suffix: encode_usdz(mesh)}
     if suffix == ".obj":
-        return encode_obj(parts)
-    bare = welded(parts)
+        return encode_obj(mesh)
+    bare = welded(mesh)
     turned = trimesh.Trimesh(bare.vertices, bare.faces, process=False)
     if bare.rgba is not None and suffix != ".stl":
         rgba = np.round(255.0 * bare.rgba).astype(np.uint8)

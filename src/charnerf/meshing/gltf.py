@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from charnerf.meshing.parts import MeshParts
+from charnerf.meshing.exported import ExportedMesh
 from charnerf.surfaces.color import linear_from_srgb
 
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
@@ -23,9 +23,9 @@ _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
 _LINEAR, _MIPMAPPED, _CLAMP = 9729, 9987, 33071
 
 
-def encode_glb(parts: MeshParts) -> bytes:
+def encode_glb(mesh: ExportedMesh) -> bytes:
     """One mesh as binary glTF."""
-    document, binary = _document(parts)
+    document, binary = _document(mesh)
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     chunks = (
@@ -37,9 +37,9 @@ def encode_glb(parts: MeshParts) -> bytes:
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
-def encode_gltf(parts: MeshParts) -> bytes:
+def encode_gltf(mesh: ExportedMesh) -> bytes:
     """One mesh as a self-contained glTF text, buffer and picture inside."""
-    document, binary = _document(parts)
+    document, binary = _document(mesh)
     document["buffers"][0]["uri"] = (
         "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
     )
@@ -68,30 +68,30 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def _document(parts: MeshParts) -> tuple[dict[str, Any], bytes]:
+def _document(mesh: ExportedMesh) -> tuple[dict[str, Any], bytes]:
     """The JSON part and the buffer."""
     buffer = _Buffer()
-    positions = np.ascontiguousarray(parts.vertices, "<f4")
+    positions = np.ascontiguousarray(mesh.vertices, "<f4")
     bounds = {"min": positions.min(0).tolist(), "max": positions.max(0).tolist()}
     attributes = {
         "POSITION": buffer.add(positions, _FLOAT, "VEC3", _ARRAY_BUFFER, **bounds),
-        "NORMAL": buffer.add(_unit(parts.normals), _FLOAT, "VEC3", _ARRAY_BUFFER),
+        "NORMAL": buffer.add(_unit(mesh.normals), _FLOAT, "VEC3", _ARRAY_BUFFER),
     }
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
     more: dict[str, Any] = {}
-    if parts.uv is not None:
-        downward = np.stack((parts.uv[:, 0], 1.0 - parts.uv[:, 1]), axis=1)
+    if mesh.uv is not None:
+        downward = np.stack((mesh.uv[:, 0], 1.0 - mesh.uv[:, 1]), axis=1)
         uv = np.ascontiguousarray(downward, "<f4")
         attributes["TEXCOORD_0"] = buffer.add(uv, _FLOAT, "VEC2", _ARRAY_BUFFER)
         surface["baseColorTexture"] = {"index": 0}
-        picture = {"name": parts.name, "mimeType": "image/png", "bufferView": buffer.add_raw(parts.png())}
+        picture = {"name": mesh.name, "mimeType": "image/png", "bufferView": buffer.add_raw(mesh.png())}
         filters = {"magFilter": _LINEAR, "minFilter": _MIPMAPPED, "wrapS": _CLAMP, "wrapT": _CLAMP}
         more = {"textures": [{"sampler": 0, "source": 0}], "samplers": [filters], "images": [picture]}
-    elif parts.rgba is not None:
-        linear = np.concatenate((linear_from_srgb(parts.rgba[:, :3]), parts.rgba[:, 3:]), axis=1)
+    elif mesh.rgba is not None:
+        linear = np.concatenate((linear_from_srgb(mesh.rgba[:, :3]), mesh.rgba[:, 3:]), axis=1)
         data = np.round(65535 * linear).astype("<u2")
         attributes["COLOR_0"] = buffer.add(data, _USHORT, "VEC4", _ARRAY_BUFFER, normalized=True)
-    indices = np.ascontiguousarray(parts.faces, "<u4").reshape(-1)
+    indices = np.ascontiguousarray(mesh.faces, "<u4").reshape(-1)
     primitive = {
         "attributes": attributes,
         "indices": buffer.add(indices, _UINT, "SCALAR", _ELEMENT_BUFFER),
@@ -101,10 +101,10 @@ def _document(parts: MeshParts) -> tuple[dict[str, Any], bytes]:
     document = {
         "asset": {"version": "2.0", "generator": "charnerf"},
         "scene": 0,
-        "scenes": [{"name": parts.name, "nodes": [0]}],
-        "nodes": [{"mesh": 0, "name": parts.name}],
-        "meshes": [{"name": parts.name, "primitives": [primitive]}],
-        "materials": [{"name": parts.name, "pbrMetallicRoughness": surface}],
+        "scenes": [{"name": mesh.name, "nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": mesh.name}],
+        "meshes": [{"name": mesh.name, "primitives": [primitive]}],
+        "materials": [{"name": mesh.name, "pbrMetallicRoughness": surface}],
         **more,
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,

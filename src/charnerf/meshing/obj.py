@@ -2,25 +2,25 @@
 
 import numpy as np
 
-from charnerf.meshing.parts import MeshParts, welded
+from charnerf.meshing.exported import ExportedMesh, welded
 
 
-def encode_obj(parts: MeshParts) -> dict[str, bytes]:
+def encode_obj(mesh: ExportedMesh) -> dict[str, bytes]:
     """The files of a mesh by suffix: .obj, and with a texture .mtl and .png beside it.
 
     Vertex colours follow the positions, sRGB-encoded as they are; that is how programs write them.
     """
-    body = welded(parts)
-    lines = ["# charnerf: metres, Y up, facing +Z", f"o {parts.name}"]
-    textured = parts.uv is not None
+    body = welded(mesh)
+    lines = ["# charnerf: metres, Y up, facing +Z", f"o {mesh.name}"]
+    textured = mesh.uv is not None
     if textured:
-        lines.insert(1, f"mtllib {parts.name}.mtl")
+        lines.insert(1, f"mtllib {mesh.name}.mtl")
     rows = body.vertices if textured or body.rgba is None else np.hstack((body.vertices, body.rgba[:, :3]))
     lines += _rows("v", rows)
     if textured:
-        lines += _rows("vt", parts.uv)
+        lines += _rows("vt", mesh.uv)
     lines += _rows("vn", body.normals)
-    corners = [body.faces + 1, parts.faces + 1, body.faces + 1] if textured else [body.faces + 1] * 2
+    corners = [body.faces + 1, mesh.faces + 1, body.faces + 1] if textured else [body.faces + 1] * 2
     if textured:
         lines.append("usemtl character")
     lines += _face_lines(corners, "/" if textured else "//")
@@ -32,10 +32,10 @@ def encode_obj(parts: MeshParts) -> dict[str, bytes]:
             "Kd 1 1 1",
             "Ks 0 0 0",
             "illum 1",
-            f"map_Kd {parts.name}.png",
+            f"map_Kd {mesh.name}.png",
         ]
         files[".mtl"] = ("\n".join(material) + "\n").encode()
-        files[".png"] = parts.png()
+        files[".png"] = mesh.png()
     return files
 
 

@@ -22,13 +22,12 @@ from scipy import ndimage
 from torch import Tensor
 
 from charnerf.geometry.cameras import directions_to_points, pixel_centres, pixel_rays, project
+from charnerf.pictures import read_bilinear
 from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import Cameras, SourceViews
 
 OPAQUE = 0.9  # alpha from which a pixel is the figure's alone
-EDGE = (
-    0.006  # metres, or one and a half pixels if that is more: so far inside its outline a figure is believed
-)
+EDGE = 0.006  # metres, or 1.5 pixels if that is more: so far inside its outline a figure is believed
 SMOOTH = 0.04  # metres: standard deviation of the smooth band
 BESIDE = 0.012  # metres, or one pixel if that is more: so near to an occluder's outline a point is doubted
 BEHIND = 0.04  # metres that a point must lie behind an occluder to be doubted
@@ -54,6 +53,36 @@ class Drawn:
     trust: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Drawing:
+    """A drawing made ready to be read.
+
+    Attributes:
+        camera: Its camera, shape (), float32.
+        smooth: Its smooth band, (H, W, 3), continued beyond what is believed.
+        fine: Its fine band, likewise.
+        believed: Pixels that show the figure alone, (H, W), bool.
+        occluder_depth: Least depth of the mesh near each place of the picture, (h, w), m.
+    """
+
+    camera: Cameras
+    smooth: np.ndarray
+    fine: np.ndarray
+    believed: np.ndarray
+    occluder_depth: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What one drawing says of the points that it sees: index, cosine, belief (L,), smooth and fine band (L, 3)."""
+
+    index: np.ndarray
+    cosine: np.ndarray
+    belief: np.ndarray
+    smooth: np.ndarray
+    fine: np.ndarray
+
+
 @final
 class Projector:
     """Drawings and a mesh, ready to colour points of the mesh.
@@ -65,12 +94,17 @@ class Projector:
 
     def __init__(self, views: SourceViews, mesh: trimesh.Trimesh) -> None:
         used = (views.present & ~views.mirrored)[0]
-        self._cameras: Cameras = views.cameras[0][used].to("cpu", torch.float32)
+        cameras = views.cameras[0][used].to("cpu", torch.float32)
         images = views.images[0][used].to("cpu", torch.float32).movedim(1, -1).numpy()
         self._caster = RayCaster(mesh.triangles)
-        pairs = [(self._cameras[v], images[v]) for v in range(len(images))]
-        self._bands = [_bands(image, _pixels_a_metre(camera)) for camera, image in pairs]
-        self._occluders = [self._occluder_depth(camera) for camera, _ in pairs]
+        self._drawings = [
+            _Drawing(
+                cameras[view],
+                *_bands(image, _pixels_a_metre(cameras[view])),
+                _occluder_depth(self._caster, cameras[view]),
+            )
+            for view, image in enumerate(images)
+        ]
 
     def at(self, points: np.ndarray, normals: np.ndarray, face: np.ndarray) -> Drawn:
         """Colours of points of the mesh.
@@ -80,41 +114,41 @@ class Projector:
             normals: Outward, (K, 3).
             face: Triangles that the points lie on, (K,).
         """
-        seen_by = [self._one_view(v, points, normals, face) for v in range(len(self._bands))]
         fine, smooth = np.zeros((len(points), 3)), np.zeros((len(points), 3))
         fine_sum, smooth_sum, trust = (np.zeros(len(points)) for _ in range(3))
-        for which, (cosine, belief, low, high) in seen_by:
-            narrow, wide = belief * cosine**NARROW, belief * cosine**WIDE
-            fine[which] += narrow[:, None] * high
-            smooth[which] += wide[:, None] * low
-            fine_sum[which] += narrow
-            smooth_sum[which] += wide
-            trust[which] = np.maximum(trust[which], belief * cosine)
+        for drawing in self._drawings:
+            read = self._read(drawing, np.asarray(points), normals, face)
+            narrow, wide = read.belief * read.cosine**NARROW, read.belief * read.cosine**WIDE
+            fine[read.index] += narrow[:, None] * read.fine
+            smooth[read.index] += wide[:, None] * read.smooth
+            fine_sum[read.index] += narrow
+            smooth_sum[read.index] += wide
+            trust[read.index] = np.maximum(trust[read.index], read.belief * read.cosine)
         smooth /= np.where(smooth_sum > 0, smooth_sum, 1.0)[:, None]
         fine /= np.where(fine_sum > 0, fine_sum, 1.0)[:, None]
         return Drawn((smooth + fine).clip(0.0, 1.0), smooth, trust)
 
-    def _one_view(
-        self, view: int, points: np.ndarray, normals: np.ndarray, face: np.ndarray
-    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Which points a view sees, and their cosines, beliefs, smooth and fine bands."""
-        camera = self._cameras[view]
-        tensor = torch.from_numpy(np.asarray(points, np.float32))
+    def _read(self, drawing: _Drawing, points: np.ndarray, normals: np.ndarray, face: np.ndarray) -> _Reading:
+        camera = drawing.camera
+        tensor = torch.from_numpy(points.astype(np.float32))
         directions = directions_to_points(camera[None], tensor)[:, 0].numpy()
         cosine = -(normals * directions).sum(1)
-        which = np.flatnonzero(cosine > LEAST_COSINE)
-        pixels, depth, in_front = (answer[which] for answer in project(camera, tensor))
-        inside = in_front & ((pixels >= 0) & (pixels <= _size_of(camera))).all(-1)
-        which, pixels, depth = which[inside.numpy()], pixels[inside], depth[inside]
-        clear = self._unhidden(camera, pixels, np.asarray(points)[which], face[which])
-        which, pixels, depth = which[clear], pixels[torch.from_numpy(clear)], depth[torch.from_numpy(clear)]
-        low, high, believed = self._bands[view]
-        belief = np.where(_nearest(believed, pixels, camera), 1.0, DOUBTED)
-        before = _nearest(self._occluders[view], pixels, camera) < depth.numpy() - BEHIND
-        belief = np.where(before, DOUBTED * belief, belief)
-        return which, (cosine[which], belief, _bilinear(low, pixels), _bilinear(high, pixels))
+        pixels, depth, in_front = project(camera, tensor)
+        framed = in_front & ((pixels >= 0) & (pixels <= _size_of(camera))).all(-1)
+        index = np.flatnonzero((cosine > LEAST_COSINE) & framed.numpy())
+        index = index[self._sees(camera, pixels[index], points[index], face[index])]
+        at = pixels[index].numpy()
+        belief = np.where(_nearest(drawing.believed, at, camera), 1.0, DOUBTED)
+        before = _nearest(drawing.occluder_depth, at, camera) < depth[index].numpy() - BEHIND
+        return _Reading(
+            index=index,
+            cosine=cosine[index],
+            belief=np.where(before, DOUBTED * belief, belief),
+            smooth=read_bilinear(drawing.smooth, at),
+            fine=read_bilinear(drawing.fine, at),
+        )
 
-    def _unhidden(self, camera: Cameras, pixels: Tensor, points: np.ndarray, face: np.ndarray) -> np.ndarray:
+    def _sees(self, camera: Cameras, pixels: Tensor, points: np.ndarray, face: np.ndarray) -> np.ndarray:
         """Whether the ray through each pixel position meets its point (K, 3) first, (K,) bool."""
         rays = pixel_rays(camera, pixels)
         origins, directions = rays.origins.numpy(), rays.directions.numpy()
@@ -123,21 +157,22 @@ class Projector:
             origins, directions, triangles=face, distances=distances, tolerance=IN_FRONT
         )
 
-    def _occluder_depth(self, camera: Cameras) -> np.ndarray:
-        """Least depth of the mesh within BESIDE of each place of the picture, m; infinite where nothing is."""
-        share = min(1.0, DEPTH_SIZE / max(camera.width, camera.height))
-        width, height = round(camera.width * share), round(camera.height * share)
-        scale = torch.tensor((camera.width / width, camera.height / height))
-        hits = self._caster.pixel_hits(camera, pixel_centres(width, height).reshape(-1, 2) * scale)
-        axis = -camera.world_from_camera[:3, 2].numpy()
-        centre = camera.world_from_camera[:3, 3].numpy()
-        depth = (hits.origins - centre) @ axis + hits.distances * (hits.directions @ axis)
-        reach = max(1, round(BESIDE * _pixels_a_metre(camera) * share))
-        return ndimage.minimum_filter(depth.reshape(height, width), size=2 * reach + 1, mode="nearest")
+
+def _occluder_depth(caster: RayCaster, camera: Cameras) -> np.ndarray:
+    """Least depth of a mesh within BESIDE of each place of a picture, (h, w), m; infinite where nothing is."""
+    share = min(1.0, DEPTH_SIZE / max(camera.width, camera.height))
+    width, height = round(camera.width * share), round(camera.height * share)
+    scale = torch.tensor((camera.width / width, camera.height / height))
+    hits = caster.pixel_hits(camera, pixel_centres(width, height).reshape(-1, 2) * scale)
+    axis = -camera.world_from_camera[:3, 2].numpy()
+    centre = camera.world_from_camera[:3, 3].numpy()
+    depth = (hits.origins - centre) @ axis + hits.distances * (hits.directions @ axis)
+    reach = max(1, round(BESIDE * _pixels_a_metre(camera) * share))
+    return ndimage.minimum_filter(depth.reshape(height, width), size=2 * reach + 1, mode="nearest")
 
 
 def _bands(image: np.ndarray, pixels_a_metre: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Smooth and fine band (H, W, 3), both continued beyond what is believed, and that, (H, W) bool."""
+    """Smooth and fine band and what is believed, as of `_Drawing`, of a picture (H, W, 4)."""
     opaque = image[..., 3] > OPAQUE
     if not opaque.any():
         opaque = image[..., 3] >= image[..., 3].max()
@@ -146,12 +181,12 @@ def _bands(image: np.ndarray, pixels_a_metre: float) -> tuple[np.ndarray, np.nda
     edge = int(EDGE * pixels_a_metre)
     believed = (depth > edge + 0.5) | ridge  # the half takes diagonal neighbours of the background, too
     nearest = tuple(ndimage.distance_transform_edt(~believed, return_distances=False, return_indices=True))
-    colour = image[..., :3].astype(np.float64)
+    rgb = image[..., :3].astype(np.float64)
     sigma = max(1.0, SMOOTH * pixels_a_metre)
     share = ndimage.gaussian_filter(believed.astype(np.float64), sigma)
-    blurred = [ndimage.gaussian_filter(colour[..., c] * believed, sigma) for c in range(3)]
+    blurred = [ndimage.gaussian_filter(rgb[..., c] * believed, sigma) for c in range(3)]
     smooth = np.stack(blurred, axis=-1) / np.maximum(share, 1e-12)[..., None]
-    fine = np.stack([_between(band) for band in np.moveaxis((colour - smooth)[nearest], -1, 0)], axis=-1)
+    fine = np.stack([_between(band) for band in np.moveaxis((rgb - smooth)[nearest], -1, 0)], axis=-1)
     return smooth[nearest], fine, believed
 
 
@@ -174,16 +209,9 @@ def _size_of(camera: Cameras) -> Tensor:
     return torch.tensor((camera.width, camera.height), dtype=torch.float32)
 
 
-def _nearest(values: np.ndarray, pixels: Tensor, camera: Cameras) -> np.ndarray:
+def _nearest(values: np.ndarray, pixels: np.ndarray, camera: Cameras) -> np.ndarray:
     """Values (K,) of a map (h, w) that spans the camera's picture, at pixels (K, 2)."""
     height, width = values.shape
-    column = (pixels[:, 0].numpy() * (width / camera.width)).astype(np.int64).clip(0, width - 1)
-    row = (pixels[:, 1].numpy() * (height / camera.height)).astype(np.int64).clip(0, height - 1)
+    column = (pixels[:, 0] * (width / camera.width)).astype(np.int64).clip(0, width - 1)
+    row = (pixels[:, 1] * (height / camera.height)).astype(np.int64).clip(0, height - 1)
     return values[row, column]
-
-
-def _bilinear(values: np.ndarray, pixels: Tensor) -> np.ndarray:
-    """Values (K, 3) of a picture (H, W, 3) at pixels (K, 2); the edge's beyond it."""
-    at = np.stack((pixels[:, 1].numpy(), pixels[:, 0].numpy())) - 0.5
-    channels = [ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(3)]
-    return np.stack(channels, axis=1)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from charnerf.errors import DataError, DependencyError
-from charnerf.meshing.parts import MeshParts
+from charnerf.meshing.exported import ExportedMesh
 from charnerf.surfaces.color import linear_from_srgb
 
 
-def encode_usdz(parts: MeshParts) -> bytes:
+def encode_usdz(exported: ExportedMesh) -> bytes:
     """One mesh as a USDZ package, its picture inside.
 
     Raises:
@@ -28,17 +28,17 @@ def encode_usdz(parts: MeshParts) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         layer = Path(folder) / "mesh.usdc"
         stage = Usd.Stage.CreateNew(str(layer))
-        _fill(stage, parts)
-        if parts.picture is not None:
-            (Path(folder) / "base_color.png").write_bytes(parts.png())
+        _fill(stage, exported)
+        if exported.picture is not None:
+            (Path(folder) / "base_color.png").write_bytes(exported.png())
         stage.GetRootLayer().Save()
         package = Path(folder) / "mesh.usdz"
         if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(layer)), str(package)):
-            raise DataError(f"{parts.name}.usdz: the package could not be made; choose .glb.")
+            raise DataError(f"{exported.name}.usdz: the package could not be made; choose .glb.")
         return package.read_bytes()
 
 
-def _fill(stage: Any, parts: MeshParts) -> None:
+def _fill(stage: Any, exported: ExportedMesh) -> None:
     """Set the scene up."""
     from pxr import Usd, UsdGeom, UsdShade, Vt
 
@@ -46,22 +46,22 @@ def _fill(stage: Any, parts: MeshParts) -> None:
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     root = UsdGeom.Xform.Define(stage, "/Character")
     Usd.ModelAPI(root).SetKind("component")
-    root.GetPrim().SetDisplayName(parts.name)
+    root.GetPrim().SetDisplayName(exported.name)
     stage.SetDefaultPrim(root.GetPrim())
     mesh = UsdGeom.Mesh.Define(stage, "/Character/Mesh")
-    points = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(parts.vertices, np.float32))
+    points = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(exported.vertices, np.float32))
     mesh.CreatePointsAttr(points)
     mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(parts.faces), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(parts.faces.astype(np.int32).reshape(-1)))
-    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(parts.normals, np.float32)))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(exported.faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(exported.faces.astype(np.int32).reshape(-1)))
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(exported.normals, np.float32)))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    material = _material(stage, mesh, parts)
+    material = _material(stage, mesh, exported)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-def _material(stage: Any, mesh: Any, parts: MeshParts) -> Any:
+def _material(stage: Any, mesh: Any, exported: ExportedMesh) -> Any:
     """A rough, non-metallic material in the mesh's colours."""
     from pxr import Gf, Sdf, UsdGeom, UsdShade, Vt
 
@@ -74,8 +74,8 @@ def _material(stage: Any, mesh: Any, parts: MeshParts) -> Any:
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
     diffuse = surface.CreateInput("diffuseColor", types.Color3f)
     reader = UsdShade.Shader.Define(stage, "/Character/Material/Reader")
-    if parts.uv is not None:
-        uv = Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(parts.uv, np.float32))
+    if exported.uv is not None:
+        uv = Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(exported.uv, np.float32))
         values.CreatePrimvar("st", types.TexCoord2fArray, UsdGeom.Tokens.vertex).Set(uv)
         reader.CreateIdAttr("UsdPrimvarReader_float2")
         reader.CreateInput("varname", types.String).Set("st")
@@ -88,10 +88,10 @@ def _material(stage: Any, mesh: Any, parts: MeshParts) -> Any:
         coordinates = reader.CreateOutput("result", types.Float2)
         picture.CreateInput("st", types.Float2).ConnectToSource(coordinates)
         diffuse.ConnectToSource(picture.CreateOutput("rgb", types.Float3))
-    elif parts.rgba is not None:
-        linear = np.ascontiguousarray(linear_from_srgb(parts.rgba[:, :3]), np.float32)
-        colours = values.CreatePrimvar("displayColor", types.Color3fArray, UsdGeom.Tokens.vertex)
-        colours.Set(Vt.Vec3fArray.FromNumpy(linear))
+    elif exported.rgba is not None:
+        linear = np.ascontiguousarray(linear_from_srgb(exported.rgba[:, :3]), np.float32)
+        colors = values.CreatePrimvar("displayColor", types.Color3fArray, UsdGeom.Tokens.vertex)
+        colors.Set(Vt.Vec3fArray.FromNumpy(linear))
         reader.CreateIdAttr("UsdPrimvarReader_float3")
         reader.CreateInput("varname", types.String).Set("displayColor")
         diffuse.ConnectToSource(reader.CreateOutput("result", types.Float3))

@@ -1,4 +1,4 @@
-"""What a file of a mesh is made of, in the axes of its format."""
+"""A mesh as a file format wants it: its axes, and what of colours it has."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from PIL import Image
-from scipy import ndimage
 
 from charnerf.meshing.axes import vertices_for
 from charnerf.meshing.extract import vertex_colours
+from charnerf.pictures import read_bilinear
 
 
 @dataclass(frozen=True)
-class MeshParts:
-    """One mesh, ready to be written.
+class ExportedMesh:
+    """One mesh in the axes of a file format, ready to be written.
 
     Attributes:
         name: Of node, mesh and files beside.
@@ -44,7 +44,7 @@ class MeshParts:
         return stream.getvalue()
 
 
-def parts_of(mesh: trimesh.Trimesh, suffix: str, name: str) -> MeshParts:
+def exported(mesh: trimesh.Trimesh, suffix: str, name: str) -> ExportedMesh:
     """Turn a mesh of the world frame into the axes of a format.
 
     Args:
@@ -53,7 +53,7 @@ def parts_of(mesh: trimesh.Trimesh, suffix: str, name: str) -> MeshParts:
         name: Of the mesh.
     """
     rgba, picture = vertex_colours(mesh), texture_picture(mesh)
-    return MeshParts(
+    return ExportedMesh(
         name=name,
         vertices=vertices_for(suffix, mesh.vertices),
         normals=vertices_for(suffix, mesh.vertex_normals),
@@ -74,21 +74,21 @@ def texture_picture(mesh: trimesh.Trimesh) -> Image.Image | None:
     return found if found is not None else getattr(material, "image", None)
 
 
-def welded(parts: MeshParts) -> MeshParts:
+def welded(mesh: ExportedMesh) -> ExportedMesh:
     """The mesh with vertices that were split at texture seams joined again, coloured by the texture there."""
-    if parts.uv is None or parts.picture is None:
-        return parts
-    keys = np.concatenate((parts.vertices, parts.normals), axis=1)
+    if mesh.uv is None or mesh.picture is None:
+        return mesh
+    keys = np.concatenate((mesh.vertices, mesh.normals), axis=1)
     _, first, joined = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     joined = joined.reshape(-1)
-    read = read_texture(parts.picture, parts.uv)
+    read = read_texture(mesh.picture, mesh.uv)
     counts = np.bincount(joined)[:, None]
     mean = np.stack([np.bincount(joined, weights=read[:, c]) for c in range(3)], axis=1) / counts
-    return MeshParts(
-        name=parts.name,
-        vertices=parts.vertices[first],
-        normals=parts.normals[first],
-        faces=joined[parts.faces],
+    return ExportedMesh(
+        name=mesh.name,
+        vertices=mesh.vertices[first],
+        normals=mesh.normals[first],
+        faces=joined[mesh.faces],
         rgba=np.concatenate((mean, np.ones((len(mean), 1))), axis=1),
         uv=None,
         picture=None,
@@ -99,6 +99,4 @@ def read_texture(picture: Image.Image, uv: np.ndarray) -> np.ndarray:
     """Colours (P, 3) in [0, 1] of a texture at places (P, 2), v upwards, between texels bilinearly."""
     values = np.asarray(picture.convert("RGB"), np.float64) / 255.0
     height, width = values.shape[:2]
-    at = np.stack(((1.0 - uv[:, 1]) * height - 0.5, uv[:, 0] * width - 0.5))
-    channels = [ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(3)]
-    return np.stack(channels, axis=1)
+    return read_bilinear(values, np.stack((uv[:, 0] * width, (1.0 - uv[:, 1]) * height), axis=1))
