@@ -11,7 +11,8 @@ import pytest
 import trimesh
 
 from charnerf.cli import run
-from charnerf.config.composition import compose_config, run_door
+from charnerf.config.command_line import run_door
+from charnerf.config.composition import compose_config
 from charnerf.errors import ConfigError, DataError
 from charnerf.inference.build import build_model
 from charnerf.inference.weights import save_config, save_weights

@@ -8,7 +8,8 @@ from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
 from charnerf.config import validate, validate_model
-from charnerf.config.composition import check_command_line, compose_config
+from charnerf.config.command_line import check_command_line
+from charnerf.config.composition import compose_config
 from charnerf.errors import ConfigError
 from charnerf.inference.build import build_model, build_part, build_renderer
 

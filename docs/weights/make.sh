@@ -62,8 +62,8 @@ resume=()
 [ -e "$run/checkpoints/last.ckpt" ] && resume=("ckpt_path=$run/checkpoints/last.ckpt")
 python train.py data=folder "data.root=$data" \
   'splits.train=[train,train_extra,chibi,train,train_extra,chibi,more,more,more,variants,swaps,embedded]' \
-  features=image_hull_section_consistency encoder.coarse_width=64 encoder.coarse_channels=64 augmentation=stretch_recolor \
-  augmentation.recolor_share=0.7 augmentation.stretch_share=0.8 averaging.decay=0.998 batches.foreground_share=0.65 \
+  features=image_hull_section_consistency encoder.coarse_width=64 encoder.coarse_channels=64 'augmentation=[stretch,recolor,mirror]' \
+  augmentation.recolor.share=0.7 augmentation.stretch.share=0.8 averaging.decay=0.998 batches.foreground_share=0.65 \
   budget.seconds=3960 batches.memory_mib=16000 \
   "hydra.run.dir=$run" "${resume[@]}" "$@"
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.config.composition import parse_overrides
 from charnerf.config.hydra_internals import looks_only, read_arguments, split_sweep
+from charnerf.config.overrides import parse_overrides
 
 ROOT = Path(__file__).resolve().parents[2]
 WALL = ROOT / "src/charnerf/config/hydra_internals.py"

@@ -5,7 +5,11 @@ from dataclasses import fields, replace
 import pytest
 import torch
 
-from charnerf.data.augmentation import MirrorAndRecolor, StretchAndRecolor, mirror, recolor, stretch
+from charnerf.data.augmentation.base import AbstractAugmentation
+from charnerf.data.augmentation.mirror import Mirror, mirror
+from charnerf.data.augmentation.recolor import Recolor, recolor
+from charnerf.data.augmentation.sequence import AugmentationSequence
+from charnerf.data.augmentation.stretch import Stretch, stretch
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import BatchRequest
 from charnerf.data.store import CharacterStore
@@ -120,9 +124,41 @@ def test_colours_are_exchanged_in_drawings_and_targets_alike(batch):
 
 
 def test_shares_of_nought_and_one_do_nothing_and_all(batch):
-    shares = {"stretch_share": 0.0, "mirror_share": 0.0, "recolor_share": 0.0}
     ranges = {"width_range": [0.8, 1.0], "depth_range": [0.8, 1.2], "used_views": VIEWS}
-    never = StretchAndRecolor(**shares, **ranges)(batch, torch.Generator().manual_seed(0))
-    assert all(torch.equal(value, dict(tensors(batch))[name]) for name, value in tensors(never))
-    always = MirrorAndRecolor(mirror_share=1.0, recolor_share=0.0)(batch, torch.Generator())
+    never = AugmentationSequence([Stretch(share=0.0, **ranges), Recolor(share=0.0), Mirror(share=0.0)])
+    unchanged = never(batch, torch.Generator().manual_seed(0))
+    assert all(torch.equal(value, dict(tensors(batch))[name]) for name, value in tensors(unchanged))
+    always = AugmentationSequence([Recolor(share=0.0), Mirror(share=1.0)])(batch, torch.Generator())
     torch.testing.assert_close(always.rays.origins, mirror(batch).rays.origins)
+
+
+def test_what_one_change_draws_does_not_move_the_decisions_of_the_next(batch):
+    """Whether a batch is mirrored depends on the seed, not on whether it was recoloured."""
+
+    def is_mirrored(seed, share):
+        changes = AugmentationSequence([Recolor(share=share), Mirror(share=0.5)])
+        changed = changes(batch, torch.Generator().manual_seed(seed))
+        return not torch.equal(changed.rays.origins, batch.rays.origins)
+
+    decisions = [is_mirrored(seed, share=0.0) for seed in range(20)]
+    assert decisions == [is_mirrored(seed, share=1.0) for seed in range(20)]
+    assert 5 < sum(decisions) < 15
+
+
+def test_changes_are_made_in_the_order_of_the_sequence(batch):
+    add = [Offset(1.0), Offset(2.0)]
+    changed = AugmentationSequence(add)(batch, torch.Generator().manual_seed(7))
+    first, second = torch.rand(2, generator=torch.Generator().manual_seed(7))
+    torch.testing.assert_close(changed.rgb, (batch.rgb * 1.0 + first) * 2.0 + second)
+
+
+class Offset(AbstractAugmentation):
+    """Colours times a factor and plus what it draws."""
+
+    num_draws = 1
+
+    def __init__(self, factor):
+        self.factor = factor
+
+    def __call__(self, batch, draws, generator):
+        return replace(batch, rgb=batch.rgb * self.factor + draws[0])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import pytest
 import torch
 
-from charnerf.data.augmentation import DrawnSources
+from charnerf.data.augmentation.drawing import Drawing
 from charnerf.data.drawing_style import DrawingStyle, contour_ink, draw_pictures, edge_ink, random_style
 
 EXACT = DrawingStyle(
@@ -109,7 +109,8 @@ def test_only_the_source_views_of_a_batch_change(disc):
     images = disc[None].expand(2, 2, 4, 64, 64)
     batch = Batch(views=Views(images), rgb=torch.ones(2, 5, 3))
     mistakes = {"wobble": 0.01, "shift": 0.01, "scale": 0.01}
-    drawn = DrawnSources(drawing_share=1.0, **mistakes)(batch, seeded())
+    no_draws = torch.zeros(0)
+    drawn = Drawing(share=1.0, **mistakes)(batch, no_draws, seeded())
     assert drawn.rgb is batch.rgb and not torch.equal(drawn.views.images, images)
     assert not torch.equal(drawn.views.images[0], drawn.views.images[1])  # a style a character
-    assert torch.equal(DrawnSources(drawing_share=0.0, **mistakes)(batch, seeded()).views.images, images)
+    assert torch.equal(Drawing(share=0.0, **mistakes)(batch, no_draws, seeded()).views.images, images)

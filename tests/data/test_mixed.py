@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from charnerf.data.augmentation import NoAugmentation
+from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.mixed import MixedDataset, stack_views
 from charnerf.data.sampler import BatchRequest
 from charnerf.data.store import CharacterStore
@@ -50,7 +50,7 @@ def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 
 def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
     settings = {
         "characters": 1, "foreground_share": 0.75, "space_points": 0,
-        "reads_depth": False, "used_views": Turnaround(), "augmentation": NoAugmentation(), "seed": 5,
+        "reads_depth": False, "used_views": Turnaround(), "augmentation": AugmentationSequence([]), "seed": 5,
     }  # fmt: skip
     return MixedDataset(store=store, **settings | changes)
 

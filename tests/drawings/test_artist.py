@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from charnerf.config.options import option
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawings
@@ -44,6 +45,12 @@ def test_reconstruct_reads_them_as_the_silhouettes_that_were_drawn(character, tm
             rows, columns = torch.nonzero(mask, as_tuple=True)
             extents.append(float((columns.max() - columns.min() + 1) / (rows.max() - rows.min() + 1)))
         assert extents[0] == pytest.approx(extents[1], abs=0.08)  # two pixels of 32
+
+
+def test_a_careful_hand_makes_the_mistakes_that_training_draws():
+    drawing, careful = option("augmentation", "drawing"), LEVELS[1]
+    assert (careful.wobble, careful.shift, careful.scale) == (drawing.wobble, drawing.shift, drawing.scale)
+    assert careful.limbs_deg == careful.head_deg == 0.0
 
 
 def test_views_differ_more_from_level_to_level(character):

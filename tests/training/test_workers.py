@@ -13,7 +13,7 @@ SETTINGS = (
     "loss=charnerf",
     "surface=area",
     "schedule=two_phase",
-    "augmentation=stretch_recolor",
+    "augmentation=[stretch,recolor,mirror]",
     "scale.steps=6",
     "validation.times=3",
 )

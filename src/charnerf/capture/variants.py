@@ -1,7 +1,7 @@
 """Other characters out of one: a surface bent into other proportions, at random and smoothly.
 
-Unlike a stretch of the whole world (data/augmentation.py), which a captured picture can follow, these maps bend rays: a variant
-has to be captured anew.
+Unlike a stretch of the whole world (data/augmentation/stretch.py), which a captured picture can follow, these maps bend rays: a
+variant has to be captured anew.
 """
 
 from dataclasses import replace

@@ -37,7 +37,7 @@ def main(arguments: Sequence[str], *, conf: Path | None = None) -> int:
         Exit status: 0 done, 1 failed, 2 wrong call. HYDRA_FULL_ERROR=1 shows tracebacks.
     """
     limit_spinning()
-    from charnerf.config.composition import run_door
+    from charnerf.config.command_line import run_door
     from charnerf.config.options import conf_folder
 
     folder = (conf or conf_folder()).resolve()
@@ -81,7 +81,7 @@ def run_job(cfg: "DictConfig") -> None:
     from hydra.types import RunMode
 
     from charnerf.config import validate
-    from charnerf.config.composition import trusted_by
+    from charnerf.config.overrides import trusted_by
     from charnerf.training.cells import run_cell
     from charnerf.training.run import run_training
 

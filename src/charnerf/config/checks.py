@@ -113,7 +113,10 @@ def check_part(part: Part, value: Any, key: str, problems: Problems, *, hint: An
     """Check a section with `_target_`: that it may be named, that it exists, and its arguments."""
     if not isinstance(value, Mapping) or "_target_" not in value:
         homes = " or ".join(part.homes)
-        problems.add(key, f"found {shown(value)}, expected a section with _target_, a class of {homes}.")
+        advice = "; choose the option that brings it, or name a class" if isinstance(value, Mapping) else ""
+        problems.add(
+            key, f"found {shown(value)}, expected a section with _target_, a class of {homes}{advice}."
+        )
         return
     for name, kind in DIRECTIVES.items():
         if name in value and not isinstance(value[name], kind):

@@ -9,8 +9,9 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from charnerf.config.composition import parse_overrides
 from charnerf.config.hydra_internals import looks_only, read_arguments
+from charnerf.config.overrides import parse_overrides
+from charnerf.config.schema import LIST_GROUPS
 
 GRIDS = Path("outputs/grid")
 SETTABLE = ("hydra.sweep.dir", "hydra.job.config.override_dirname.exclude_keys")
@@ -67,5 +68,9 @@ def grid_command(arguments: Sequence[str]) -> GridCommand | None:
 def config_hash(cfg: DictConfig) -> str:
     """Name a composed config by what it says, 8 hexadecimal digits; where a run begins does not count."""
     plain: Any = OmegaConf.to_container(cfg, resolve=True)
-    kept = {key: value for key, value in plain.items() if key not in NOT_OF_A_CELL}
+    kept = {
+        key: list(value.items()) if key in LIST_GROUPS else value
+        for key, value in plain.items()
+        if key not in NOT_OF_A_CELL
+    }
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()[:8]

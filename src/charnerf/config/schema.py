@@ -158,7 +158,7 @@ class RunConfig:
     averaging: Averaging
     surface_dirs: _part("charnerf.losses")  # type: ignore[valid-type]
     surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
-    augmentation: _part("charnerf.data.augmentation", given=["used_views"])  # type: ignore[valid-type]
+    augmentation: dict[str, _part("charnerf.data.augmentation", given=["used_views"])]  # type: ignore[valid-type]
     loss: _part("charnerf.losses")  # type: ignore[valid-type]
     schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
     data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
@@ -166,6 +166,7 @@ class RunConfig:
     trainer: _part("lightning", given=TRAINER_GIVEN)  # type: ignore[valid-type]
 
 
+LIST_GROUPS = ("augmentation",)  # any number of options, in order, each a part of its own
 MODEL_SECTIONS = (
     "model",
     "encoder",

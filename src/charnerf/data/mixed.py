@@ -7,7 +7,6 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from charnerf.data.augmentation import AbstractAugmentation
 from charnerf.data.sampler import BatchRequest, step_seed
 from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
@@ -42,7 +41,7 @@ class MixedDataset(Dataset[TrainBatch]):
         space_points: int,
         reads_depth: bool,
         used_views: Callable[[SourceViews], SourceViews],
-        augmentation: AbstractAugmentation,
+        augmentation: Callable[[TrainBatch, torch.Generator], TrainBatch],
         seed: int,
     ) -> None:
         self.store = store

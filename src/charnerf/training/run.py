@@ -13,6 +13,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard.summary import hparams
 
+from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.characters import Character, load_character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.layout import names_of, read_dataset
@@ -128,7 +129,9 @@ def build_data(
             space_points=cfg.sampling.space_points if reads(cfg, losses, "occupancy") else 0,
             reads_depth=reads(cfg, losses, "depth"),
             used_views=model.views,
-            augmentation=build_part(cfg.augmentation, {"used_views": model.views}),
+            augmentation=AugmentationSequence(
+                [build_part(one, {"used_views": model.views}) for one in cfg.augmentation.values()]
+            ),
             seed=cfg.seed,
         )
 

@@ -1,0 +1,1 @@
+"""Random changes of training batches, one class and one option each, and their sequence."""
