@@ -33,50 +33,59 @@ if TYPE_CHECKING:
 MEASURED_FACES = 8000  # of a split's meshes, unless --faces says otherwise
 
 
+Name = Annotated[
+    str | None,
+    typer.Option("--character", metavar="NAME", help="Character of the data set; this or --split."),
+]
+Split = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="All characters of a split, and DIR/meshes.md: what meshes and each kind of colours are worth.",
+    ),
+]
+Grids = Annotated[
+    str | None,
+    typer.Option("--lod", metavar="N,N,..", help="A mesh for each of these grids, in place of --resolution."),
+]
+Faces = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N[,N..]",
+        help="Faces after decimation; all if left out. With several numbers, or with --lod, further meshes.",
+    ),
+]
+Convergence = Annotated[
+    bool,
+    typer.Option(
+        "--convergence",
+        help="Also measure how many cameras are needed, and show levels beside the chosen one: DIR/NAME_cameras.md.",
+    ),
+]
+Format = Annotated[
+    Literal["glb", "gltf", "obj", "ply", "stl", "usdz"],
+    typer.Option("--format", help="File format; usdz needs the extra `usd`."),
+]
+
+
 def command(
     *,
     data: Dataset,
     output: Folder,
-    character: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Character of the data set; this or --split.")
-    ] = None,
-    split: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="All characters of a split, and DIR/meshes.md: what meshes and each kind of colours are worth.",
-        ),
-    ] = None,
+    character: Name = None,
+    split: Split = None,
     weights: Weights = None,
     resolution: Resolution = MeshOptions.resolution,
-    lod: Annotated[
-        str | None,
-        typer.Option(metavar="N,N,..", help="A mesh for each of these grids, in place of --resolution."),
-    ] = None,
-    faces: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N[,N..]",
-            help="Faces after decimation; all if left out. With several numbers, or with --lod, further meshes.",
-        ),
-    ] = None,
+    lod: Grids = None,
+    faces: Faces = None,
     cameras: Cameras = MeshOptions.num_cameras,
-    convergence: Annotated[
-        bool,
-        typer.Option(
-            "--convergence",
-            help="Also measure how many cameras are needed, and show levels beside the chosen one: DIR/NAME_cameras.md.",
-        ),
-    ] = False,
+    convergence: Convergence = False,
     smooth: Smooth = MeshOptions.smooth,
     symmetric: Symmetric = False,
     height: Height = MeshOptions.height,
     texture: Colors = MeshOptions.texture,
     texture_size: TextureSize = MeshOptions.texture_size,
-    format_: Annotated[
-        Literal["glb", "gltf", "obj", "ply", "stl", "usdz"],
-        typer.Option("--format", help="File format; usdz needs the extra `usd`."),
-    ] = "glb",
+    suffix: Format = "glb",
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -87,8 +96,6 @@ def command(
     """
     if (character is None) == (split is None):
         raise typer.BadParameter("expected one of the two.", param_hint="--character, --split")
-    from charnerf.data.characters import load_character
-    from charnerf.data.layout import names_of, read_dataset
     from charnerf.meshing.lod import lod_table
     from charnerf.reconstruction.meshes import write_convergence, write_lods, write_mesh
 
@@ -102,35 +109,46 @@ def command(
         texture=texture,
         texture_size=texture_size,
     )
-    names = [character] if character is not None else names_of(read_dataset(data), split or "")
-    characters = [load_character(data, name) for name in names]
-    model = load_model(weights, device=device, trust=trust)
-    heroes = [model.encode_views(one.sources) for one in characters]
-    if symmetric:
-        heroes = [hero.symmetric() for hero in heroes]
+    heroes = _heroes(data, character, split, symmetric, weights, device=device, trust=trust)
     if split is not None:
-        _measure(characters, heroes, options, output, split)
-    for name, hero in zip(names, heroes, strict=True):
-        folder = output if split is None else output / name
+        _measure(heroes, options, output, split)
+    for one, hero in heroes:
+        folder = output if split is None else output / one.name
         if lod is None and len(counts) <= 1:
-            files = write_mesh(hero, name, folder, options, suffix=format_)
+            files = write_mesh(hero, one.name, folder, options, suffix=suffix)
         else:
+            grids = grids or (resolution,)
             files = write_lods(
-                hero,
-                name,
-                folder,
-                options,
-                resolutions=grids or (resolution,),
-                faces=counts,
-                suffix=format_,
+                hero, one.name, folder, options, resolutions=grids, faces=counts, suffix=suffix
             )
         notes = files.notes
         if convergence:
-            notes += write_convergence(hero, name, folder, files.built)
+            notes += write_convergence(hero, one.name, folder, files.built)
         for line in notes if split is None else notes[:1]:
             say(line)
         if split is None and files.lods:
             typer.echo(lod_table(files.lods))
+
+
+def _heroes(
+    data: Path,
+    character: str | None,
+    split: str | None,
+    symmetric: bool,
+    weights: Path | None,
+    *,
+    device: str,
+    trust: Sequence[str] | None,
+) -> list[tuple["Character", "Hero"]]:
+    """The characters that are meshed, encoded."""
+    from charnerf.data.characters import load_character
+    from charnerf.data.layout import names_of, read_dataset
+
+    names = [character] if character is not None else names_of(read_dataset(data), split or "")
+    characters = [load_character(data, name) for name in names]
+    model = load_model(weights, device=device, trust=trust)
+    heroes = [model.encode_views(one.sources) for one in characters]
+    return list(zip(characters, [one.symmetric() for one in heroes] if symmetric else heroes, strict=True))
 
 
 def _numbers(text: str | None, name: str, *, least: int) -> tuple[int, ...]:
@@ -148,11 +166,7 @@ def _numbers(text: str | None, name: str, *, least: int) -> tuple[int, ...]:
 
 
 def _measure(
-    characters: Sequence["Character"],
-    heroes: Sequence["Hero"],
-    options: MeshOptions,
-    output: Path,
-    split: str,
+    heroes: Sequence[tuple["Character", "Hero"]], options: MeshOptions, output: Path, split: str
 ) -> None:
     """Write and print OUTPUT/meshes.md, with meshes.json: what meshes and each kind of colors are worth."""
     from charnerf.evaluation.environment import environment
@@ -162,7 +176,7 @@ def _measure(
 
     options = replace(options, faces=options.faces or MEASURED_FACES)
     rows = {}
-    for character, hero in zip(characters, heroes, strict=True):
+    for character, hero in heroes:
         rows[character.name] = score_meshes(hero.scene, character, options)
         say(f"{character.name}: measured")
     facts = {
@@ -170,7 +184,7 @@ def _measure(
         "grid": options.resolution,
         "faces": options.faces,
         "texels": options.texture_size,
-        **environment(heroes[0].scene.bounds.box_min.device),
+        **environment(heroes[0][1].views.images.device),
         "peak_memory_mib": round(process_peak_mib()),
     }
     text = score_text(rows, facts)
