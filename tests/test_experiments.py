@@ -7,8 +7,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from charnerf.config.composition import compose_config
-from charnerf.inference.build import build_part
-from charnerf.training.run import reads
+from charnerf.training.run import build_losses
 
 ROOT = Path(__file__).resolve().parents[1]
 EXPERIMENT_ROWS = {"charnerf", "pixelnerf", "single_encoder", "no_mha", "no_mha_depth", "no_view"}
@@ -36,7 +35,7 @@ ENCODER = {
 ENCODER |= {"encoder._target_", "encoder.reduction"}
 ATTENTION = {"num_heads", "attention_width", "residual", "norm", "lr_scale", "temperature", "view_scale"}
 ATTENTION = {f"combinator.{key}" for key in ATTENTION} | {"combinator._target_"}
-SURFACE = {"loss.weights.surface_rgb", "loss.weights.surface_alpha"}
+SURFACE = {"loss.surface.rgb_weight", "loss.surface.alpha_weight"}
 PIXELNERF = {
     *ENCODER,
     *("encoder.depth", "encoder.stride", "encoder.pretrained"),
@@ -44,13 +43,19 @@ PIXELNERF = {
     *SURFACE,
     *("single_view._target_", "single_view.octaves", "single_view.factor"),
     *("density._target_", "model.activation._target_", "model.activation.shift", "model.activation.scale"),
-    *("quadrature._target_", "quadrature.share", "quadrature.deviation", "renderer.num_fine"),
+    *(
+        "quadrature._target_",
+        "quadrature.share",
+        "quadrature.deviation",
+        "renderer.num_fine",
+        "loss.surface.num_fine",
+    ),
     *("scale.num_multi_view_blocks", "model.num_multi_view_blocks"),
 }
 ROWS = {
     "single_encoder": {*ENCODER, "encoder.num_stacks", "encoder.width", "encoder.out_channels"},
     "no_mha": ATTENTION,
-    "no_mha_depth": {*ATTENTION, "loss.weights.depth"},
+    "no_mha_depth": {*ATTENTION, "loss.depth.weight"},
     "no_view": {"combinator._target_", "combinator.view_scale"},
     "pixelnerf": PIXELNERF,
 }
@@ -74,7 +79,7 @@ def test_pixelnerf_is_pixelnerf_at_the_papers_scale() -> None:
     assert (cfg.single_view.octaves, cfg.single_view.factor) == (6, 1.5)
     assert (cfg.model.num_single_view_blocks, cfg.model.num_multi_view_blocks) == (3, 2)
     assert (cfg.model.width, cfg.scale.learning_rate, cfg.scale.batch_characters) == (512, 1e-4, 4)
-    assert dict(cfg.loss.weights) == {"reconstruction": 1.0}
+    assert build_losses(cfg)[0].active({}) == {"reconstruction": 1.0}
     for group, name in (("encoder", "ResNet34"), ("combinator", "Mean"), ("head", "RadianceHead")):
         assert cfg[group]._target_.endswith(f".{name}")
     assert cfg.model.activation._target_.endswith(".ReLU") and cfg.density._target_.endswith(
@@ -85,9 +90,9 @@ def test_pixelnerf_is_pixelnerf_at_the_papers_scale() -> None:
 def test_only_the_row_with_depth_reads_it() -> None:
     for row in EXPERIMENT_ROWS:
         cfg = compose_config([f"experiment={row}"])
-        assert reads(cfg, build_part(cfg.loss), "depth") == (row == "no_mha_depth")
+        assert build_losses(cfg)[1].depth == (row == "no_mha_depth")
         both = compose_config([f"experiment={row}", "loss=opacity"])  # the table once more, with another loss
-        assert both.loss.weights.opacity == 0.1
+        assert both.loss.opacity.weight == 0.1
 
 
 def test_overrides_win_over_an_experiment() -> None:

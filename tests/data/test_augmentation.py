@@ -16,6 +16,7 @@ from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface
 from charnerf.geometry.cameras import project_into_all
 from charnerf.geometry.hull import build_hull, hull_contains
+from charnerf.losses.base import Needs
 from charnerf.models.views.mirrored import MirroredSide
 from charnerf.surfaces.mesh_files import load_surface_mesh
 
@@ -38,8 +39,8 @@ def batch(figure_dataset):
         root=figure_dataset, names=("lefty",), carve=carve, memory_mib=64.0, surface_of=surface_of
     )
     dataset = MixedDataset(
-        store=store, characters=1, foreground_share=0.75, space_points=200,
-        reads_depth=True, used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5,
+        store=store, characters=1, foreground_share=0.75,
+        needs=Needs(depth=True, space_points=200), used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5,
     )  # fmt: skip
     return dataset[BatchRequest(step=0, rays=64, surface_points=300, phase=0, loss_weights={})]
 

@@ -19,6 +19,7 @@ from charnerf.data.validation import ValidationDataset, spread_frames
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
 from charnerf.geometry.hull import build_hull, occupied_edges
+from charnerf.losses.base import Needs
 from charnerf.models.views.turnaround import Turnaround
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.types import SourceViews, TrainBatch
@@ -49,8 +50,8 @@ def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 
 
 def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
     settings = {
-        "characters": 1, "foreground_share": 0.75, "space_points": 0,
-        "reads_depth": False, "used_views": Turnaround(), "augmentation": AugmentationSequence([]), "seed": 5,
+        "characters": 1, "foreground_share": 0.75, "needs": Needs(),
+        "used_views": Turnaround(), "augmentation": AugmentationSequence([]), "seed": 5,
     }  # fmt: skip
     return MixedDataset(store=store, **settings | changes)
 
@@ -80,7 +81,7 @@ def same(one: TrainBatch, other: TrainBatch) -> bool:
 
 def test_the_same_request_makes_the_same_batch(figure_dataset, store):
     """Also in another process's data set, in any order; another step or seed makes another one."""
-    settings = {"space_points": 20}
+    settings = {"needs": Needs(space_points=20)}
     dataset = dataset_of(store, **settings)
     asked = request(3, surface_points=30)
     first = dataset[asked]
@@ -135,7 +136,7 @@ def test_without_a_hull_any_background_is_drawn(figure_dataset):
 
 
 def test_depth_is_along_the_ray(store):
-    batch = dataset_of(store, reads_depth=True)[request(rays=500)]
+    batch = dataset_of(store, needs=Needs(depth=True))[request(rays=500)]
     t_vals, _ = helpers.trace(FIGURES[batch.names[0]], batch.rays[0])
     hit = t_vals.isfinite()
     torch.testing.assert_close(batch.depth[0][hit], t_vals[hit].float(), atol=1.5e-3, rtol=0)
@@ -154,7 +155,7 @@ def test_surface_points_lie_on_every_characters_surface(store):
 
 def test_counts_are_of_all_characters_together(store):
     for characters in (1, 2, 5):
-        batch = dataset_of(store, characters=characters, space_points=40)[request(rays=100)]
+        batch = dataset_of(store, characters=characters, needs=Needs(space_points=40))[request(rays=100)]
         used = min(characters, 2)
         assert len(batch.names) == len(set(batch.names)) == used
         assert batch.alpha.numel() == 100 and batch.space.points.shape == (used, 40 // used, 3)
@@ -177,8 +178,10 @@ def test_a_character_without_a_mesh_makes_a_batch_of_rays(tmp_path):
 def test_labelled_points_need_a_hull(figure_dataset):
     store = store_of(figure_dataset, hull=False)
     assert dataset_of(store)[request()].hull is None
-    with pytest.raises(DataError, match=r"loss\.weights\.occupancy: .* with model\.hull=false"):
-        dataset_of(store, space_points=8)[request()]
+    with pytest.raises(
+        DataError, match=r"model\.hull: found false, but a term of the loss reads labelled points"
+    ):
+        dataset_of(store, needs=Needs(space_points=8))[request()]
 
 
 def test_padded_views_are_absent():

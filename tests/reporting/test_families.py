@@ -102,8 +102,8 @@ def test_pictures_of_many_rows_show_the_plain_and_the_best(search):
 
 
 def test_keys_that_end_alike_keep_their_whole_name():
-    rows = group_rows([run("loss.weights.depth=1"), run("encoder.depth=3"), run("+loss.weights.opacity=2")])
-    assert [row.label for row in rows] == ["loss.weights.depth=1", "encoder.depth=3", "opacity=2"]
+    rows = group_rows([run("data.depth=1"), run("encoder.depth=3"), run("+loss.opacity.weight=2")])
+    assert [row.label for row in rows] == ["data.depth=1", "encoder.depth=3", "opacity.weight=2"]
 
 
 def test_rows_that_began_at_random_are_told():

@@ -13,7 +13,7 @@ from charnerf.data.datamodule import MixedDataModule
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
-from charnerf.training.run import build_data, build_trainer, surface_delta, training_renderer
+from charnerf.training.run import build_data, build_losses, build_trainer, training_renderer
 
 
 def smoke_config(root: Path, *overrides: str) -> DictConfig:
@@ -67,21 +67,19 @@ def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> Sma
     folder.mkdir(parents=True, exist_ok=True)
     model = build_model(cfg)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
-    losses = build_part(cfg.loss)
+    losses, needs = build_losses(cfg)
     module = TrainingModule(
         model=model,
         renderer=training_renderer(cfg),
         eval_renderer=build_renderer(cfg),
         losses=losses,
-        surface_dirs=build_part(cfg.surface_dirs),
         optimizer=build_part(cfg.optimizer),
         final_rate=cfg.optimization.final_lr_scale,
         position=clock.position,
-        surface_delta=surface_delta(cfg),
         seed=cfg.seed,
     )
-    data = build_data(cfg, Path(cfg.data.root), model, clock, losses)
-    trainer = build_trainer(cfg, folder, clock)
+    data = build_data(cfg, Path(cfg.data.root), model, clock, needs)
+    trainer = build_trainer(cfg, folder, clock, losses.names)
     recorder = Recorder(cut_at=cut_at)
     trainer.callbacks.insert(1, recorder)  # type: ignore[attr-defined]
     return SmallRun(module, data, trainer, clock, recorder)

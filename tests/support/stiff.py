@@ -11,11 +11,11 @@ from torch import Tensor, nn
 from charnerf.config.composition import compose_config
 from charnerf.errors import CharNeRFError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.inference.build import build_model, build_part
-from charnerf.losses.total import PassOutput, WeightedLosses
+from charnerf.inference.build import build_model
+from charnerf.losses.total import Pass
 from charnerf.models.charnerf import CharNeRF
 from charnerf.stability.transforms import Motion
-from charnerf.training.run import training_renderer
+from charnerf.training.run import build_losses, training_renderer
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, TrainBatch
 from support.helpers import dumbbell, person, photograph, source_views, target_cameras
 
@@ -124,7 +124,7 @@ def fit(
         cfg.model.activation.scale /= density_length or length
     torch.manual_seed(0)
     model, renderer = build_model(cfg), training_renderer(cfg)
-    losses: WeightedLosses = build_part(cfg.loss)
+    losses, _ = build_losses(cfg)
     hull = model.carve(character.views)
     optimizer = torch.optim.Adam(model.parameters(), lr=rate)
     history = []
@@ -132,8 +132,9 @@ def fit(
         batch = batch_of(character, hull, step, change)
         with torch.autocast("cpu", dtype=autocast or torch.bfloat16, enabled=autocast is not None):
             scene = model.scene(model.encode(batch.views, batch.hull), 0)
-            output = renderer.render(scene, batch.rays[0], torch.Generator().manual_seed(step)).finest
-            total, _ = losses([PassOutput(output[None], None, None, None)], batch)
+            generator = torch.Generator().manual_seed(step)
+            output = renderer.render(scene, batch.rays[0], generator).finest
+            total, _ = losses([Pass(output[None], [scene.field])], batch, generator)
         optimizer.zero_grad()
         if total.requires_grad:
             total.backward()

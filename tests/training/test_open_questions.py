@@ -4,8 +4,16 @@ import pytest
 import torch
 
 from charnerf.errors import ConfigError
-from charnerf.training.run import surface_delta
+from charnerf.losses.surface import Surface
+from charnerf.losses.total import WeightedLosses
+from charnerf.training.run import build_losses
 from support import small_runs
+
+
+def surface_of(losses: WeightedLosses) -> Surface:
+    (term,) = (one for one in losses.terms if isinstance(one, Surface))
+    return term
+
 
 PAPER = ("experiment=charnerf", "encoder=single", "scale.steps=2", "validation.times=1")
 
@@ -19,8 +27,9 @@ def test_a_combinator_learns_at_its_own_rate_and_points_are_seen_from_cameras(fi
     assert {id(p) for p in own["params"]} == mine
     assert len(others["params"]) + len(mine) == len(list(run.module.model.parameters()))
     seen: list[torch.Tensor] = []
-    rule = run.module.surface_dirs
-    run.module.surface_dirs = lambda *arguments: seen.append(rule(*arguments)) or seen[-1]  # type: ignore[assignment, func-returns-value]
+    term = surface_of(run.module.losses)
+    rule = term.directions
+    term.directions = lambda *arguments: seen.append(rule(*arguments)) or seen[-1]  # type: ignore[assignment, func-returns-value]
     run.fit()
     assert len(seen) == 2 and all((dirs.norm(dim=-1) - 1).abs().amax() < 1e-5 for dirs in seen)
     first, second = run.trainer.optimizers[0].param_groups
@@ -38,5 +47,12 @@ def test_one_rate_for_all_is_one_group_and_muon_takes_no_other(figure_dataset, t
 
 
 def test_delta_of_surface_points(figure_dataset):
-    assert surface_delta(small_runs.smoke_config(figure_dataset, "sampling.surface_delta=0.02")) == 0.02
-    assert surface_delta(small_runs.smoke_config(figure_dataset)) == pytest.approx(3.6 / 4)
+    def delta(*overrides):
+        losses, _ = build_losses(small_runs.smoke_config(figure_dataset, *overrides))
+        return surface_of(losses).delta
+
+    assert delta("loss.surface.delta=0.02") == 0.02
+    assert delta() == pytest.approx(3.6 / 4)
+    assert delta("scale.num_coarse=24", "scale.train_num_coarse=6") == pytest.approx(3.6 / 6)
+    with pytest.raises(ConfigError, match=r"loss\.surface\.delta: found 0, expected more than 0"):
+        delta("loss.surface.delta=0")

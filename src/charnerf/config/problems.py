@@ -18,14 +18,27 @@ class Problems:
 
     def touch(self, key: str) -> bool:
         """Whether a key, a part of it or a section around it has a problem."""
-        return any(
-            one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one, _ in self.found
-        )
+        return any(_is_within(one, key) or _is_within(key, one) for one, _ in self.found)
 
     def lines(self) -> list[str]:
         """One line for each problem, by full key; a wrong value is named where it was written."""
         wrong = {key for key, _ in self.found}
-        return [f"{key}: {message}" for key, message in self.found if self.copies.get(key) not in wrong]
+        return [
+            f"{key}: {message}"
+            for key, message in self.found
+            if not any(_is_within(self._origin(key), one) for one in wrong)
+        ]
+
+    def _origin(self, key: str) -> str:
+        """The key whose value a key repeats; empty where it repeats none."""
+        for copy, origin in self.copies.items():
+            if _is_within(key, copy):
+                return origin + key[len(copy) :]
+        return ""
+
+
+def _is_within(key: str, section: str) -> bool:
+    return key == section or key.startswith(f"{section}.")
 
 
 def join(key: str, name: str | int) -> str:

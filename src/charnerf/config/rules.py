@@ -48,12 +48,18 @@ def _phases_are_a_schedule(phases: Sequence[Mapping[str, Any]]) -> Iterator[tupl
         yield where, message
 
 
-def _some_term_counts(weights: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _some_term_counts(terms: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    weights = {
+        f"loss.{term}.{name}": value
+        for term, settings in terms.items()
+        for name, value in settings.items()
+        if name == "weight" or name.endswith("_weight")
+    }
     if not any(weight > 0 for weight in weights.values()):
-        yield "loss.weights", f"found {dict(weights)}, expected at least one weight above 0."
-    for term, weight in weights.items():
+        yield "loss", f"found weights of 0 ({', '.join(weights)}), expected at least one weight above 0."
+    for key, weight in weights.items():
         if weight < 0:
-            yield f"loss.weights.{term}", f"found {weight}, expected 0 or more."
+            yield key, f"found {weight}, expected 0 or more."
 
 
 def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
@@ -74,7 +80,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("combinator.lr_scale",), _lr_scale_is_positive),
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
-    (("loss.weights",), _some_term_counts),
+    (("loss",), _some_term_counts),
     (("averaging.decay",), _average_moves),
     _at_least_one("data.views"),
     _at_least_one("data.train"),

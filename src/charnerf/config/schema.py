@@ -69,14 +69,6 @@ class Batches:
 
 
 @dataclass(frozen=True)
-class Sampling:
-    """What loss terms ask of points in space and on the surface."""
-
-    space_points: CountOrZero
-    surface_delta: Annotated[float, Above(0)] | None
-
-
-@dataclass(frozen=True)
 class Validation:
     """How often a run is validated, and on how much."""
 
@@ -152,14 +144,13 @@ class RunConfig:
     renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
     splits: Splits
     batches: Batches
-    sampling: Sampling
     validation: Validation
     optimization: Optimization
     averaging: Averaging
     surface_dirs: _part("charnerf.losses")  # type: ignore[valid-type]
     surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
     augmentation: dict[str, _part("charnerf.data.augmentation", given=["used_views"])]  # type: ignore[valid-type]
-    loss: _part("charnerf.losses")  # type: ignore[valid-type]
+    loss: dict[str, _part("charnerf.losses")]  # type: ignore[valid-type]
     schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
     data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
     optimizer: _part("torch.optim", "charnerf.training", given=["params"])  # type: ignore[valid-type]

@@ -20,8 +20,6 @@ from charnerf.errors import ConfigError
 
 INTERPOLATION = re.compile(r"\$\{([\w.]+)\}")
 
-TRIED_SECTIONS = ("loss", "schedule", "data")  # constructors that only keep and check their arguments
-
 
 def validate(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
     """Check a composed config whole, before anything is built from it.
@@ -35,18 +33,21 @@ def validate(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> None:
         ConfigError: Lists every problem, each with its full key.
     """
     _validate_against(RunConfig, cfg, trusted_targets)
-    refused = [line for name in TRIED_SECTIONS for line in _refusals(cfg, name)]
+    tried = {"schedule": cfg.schedule, "data": cfg.data} | {
+        f"loss.{name}": cfg.loss[name] for name in cfg.loss
+    }
+    refused = [line for key, part in tried.items() for line in _refusals(part, key)]
     if refused:
         raise ConfigError(as_message(refused))
 
 
-def _refusals(cfg: DictConfig, section: str) -> list[str]:
-    """What the class of a section says against its values."""
+def _refusals(part: DictConfig, key: str) -> list[str]:
+    """What the class of a part says against its values: its constructor only keeps and checks them."""
     try:
-        instantiate(cfg[section], _convert_="all")
+        instantiate(part, _convert_="all")
     except InstantiationException as error:
         message = str(error.__cause__ or error)
-        return [message if message.startswith(f"{section}.") else f"{section}: {message}"]
+        return [message if message.startswith(f"{key}.") else f"{key}: {message}"]
     return []
 
 

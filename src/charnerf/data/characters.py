@@ -62,8 +62,8 @@ class Character:
         """
         if not self.depth_files:
             raise DataError(
-                f"{self.folder}: has no depth pictures, expected them because something reads depth; capture the character"
-                " again by `charnerf capture --depth`, or set loss.weights.depth=0."
+                f"{self.folder}: has no depth pictures, expected them because a term of the loss reads depth; capture the character"
+                " again by `charnerf capture --depth`, or set its weight to 0."
             )
         size = (self.cameras.width, self.cameras.height)
         return torch.stack([_read_depth(self.depth_files[index], size) for index in indices])

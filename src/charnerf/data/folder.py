@@ -32,7 +32,7 @@ class FolderData:
         names = [name for split in info.splits.values() for name in split]
         if depth and not any((self.root / name / DEPTH_FOLDER).is_dir() for name in names):
             raise DataError(
-                f"{self.root}: no character has depth pictures, expected them because loss.weights.depth is above 0;"
-                " capture the characters again by `charnerf capture --depth`, or set loss.weights.depth=0."
+                f"{self.root}: no character has depth pictures, expected them because a term of the loss reads depth;"
+                " capture the characters again by `charnerf capture --depth`, or set its weight to 0."
             )
         return self.root

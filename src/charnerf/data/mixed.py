@@ -13,6 +13,7 @@ from charnerf.data.store import CharacterStore, OpenCharacter
 from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_rays
+from charnerf.losses.base import Needs
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, SpacePoints, SurfacePoints, TrainBatch
 
 
@@ -25,8 +26,7 @@ class MixedDataset(Dataset[TrainBatch]):
         characters: B, characters a step.
         foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white;
             the rest is drawn from pixels beside it whose rays may meet the hull.
-        space_points: Labelled points a step, 0 where no loss reads them.
-        reads_depth: Whether depth pictures are read.
+        needs: What the loss reads of a batch besides rays.
         used_views: The model's rule from drawings to views; a hull has maps of all of those.
         augmentation: Changes a batch at random.
         seed: Of the run.
@@ -38,8 +38,7 @@ class MixedDataset(Dataset[TrainBatch]):
         store: CharacterStore,
         characters: int,
         foreground_share: float,
-        space_points: int,
-        reads_depth: bool,
+        needs: Needs,
         used_views: Callable[[SourceViews], SourceViews],
         augmentation: Callable[[TrainBatch, torch.Generator], TrainBatch],
         seed: int,
@@ -47,8 +46,7 @@ class MixedDataset(Dataset[TrainBatch]):
         self.store = store
         self.characters = min(characters, len(store))
         self.foreground_share = foreground_share
-        self.space_points = space_points
-        self.reads_depth = reads_depth
+        self.needs = needs
         self.used_views = used_views
         self.augmentation = augmentation
         self.seed = seed
@@ -75,7 +73,7 @@ class MixedDataset(Dataset[TrainBatch]):
             ),
             rgb=torch.stack([d[1] for d in drawn]),
             alpha=torch.stack([d[2] for d in drawn]),
-            depth=torch.stack([d[3] for d in drawn]) if self.reads_depth else None,
+            depth=torch.stack([d[3] for d in drawn]) if self.needs.depth else None,
             surface=surface,
             space=space,
             phase=request.phase,
@@ -104,7 +102,7 @@ class MixedDataset(Dataset[TrainBatch]):
         rgb, alpha = rgba[:, :3], rgba[:, 3]
         camera = one.character.cameras[image]
         rays = pixel_rays(camera, pixels)
-        depth = self._depths(one, image, rest, camera, rays) if self.reads_depth else alpha
+        depth = self._depths(one, image, rest, camera, rays) if self.needs.depth else alpha
         return rays, rgb * alpha[:, None] + (1.0 - alpha[:, None]), alpha, depth
 
     def _pixels(self, one: OpenCharacter, num_rays: int, generator: torch.Generator) -> Tensor:
@@ -130,14 +128,16 @@ class MixedDataset(Dataset[TrainBatch]):
 
     def _space(self, opened: list[OpenCharacter], generator: torch.Generator) -> SpacePoints | None:
         """Labelled points in the hulls, None where no loss reads them."""
-        if self.space_points == 0:
+        if self.needs.space_points == 0:
             return None
         if any(one.hull is None for one in opened):
             raise DataError(
-                "loss.weights.occupancy: found a weight above 0 with model.hull=false, expected a hull to draw labelled "
-                "points in; set the weight to 0 or model.hull=true."
+                "model.hull: found false, but a term of the loss reads labelled points, expected a hull to draw them in; set its "
+                "weight to 0 or model.hull=true."
             )
-        parts = [label_points(one, _shares(self.space_points, len(opened)), generator) for one in opened]
+        parts = [
+            label_points(one, _shares(self.needs.space_points, len(opened)), generator) for one in opened
+        ]
         return SpacePoints(
             points=torch.stack([p[0] for p in parts]), inside=torch.stack([p[1] for p in parts])
         )

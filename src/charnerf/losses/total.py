@@ -1,98 +1,107 @@
-"""The loss of a training step: named terms and their weights."""
+"""The loss of a training step: the weighted sum of its terms."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
+import torch
 from torch import Tensor
 
 from charnerf.errors import ConfigError
-from charnerf.losses.terms import (
-    absolute_alpha_error,
-    absolute_depth_error,
-    balanced_occupancy_error,
-    squared_color_error,
-    squared_opacity_error,
-)
-from charnerf.types import RenderOutput, TrainBatch
-
-TERMS = ("reconstruction", "surface_rgb", "surface_alpha", "opacity", "depth", "occupancy")
+from charnerf.losses.base import AbstractTerm, Needs, Query
+from charnerf.scene import AbstractField
+from charnerf.schedule import PhaseSchedule
+from charnerf.types import FieldOutput, RenderOutput, TrainBatch
 
 
 @dataclass(frozen=True)
-class PassOutput:
-    """What one field (coarse or fine) answered in a step.
+class Pass:
+    """The coarse or the fine pass of a step.
 
     Attributes:
-        rays: The rendering of the rays, (B, R).
-        surface_rgb: Colours of the surface points, (B, P, 3), or None.
-        surface_alpha: Their alphas, (B, P), or None.
-        space_alpha: Alphas of the labelled points, (B, Q), or None.
+        rays: Its rendering of the batch's rays, (B, R).
+        fields: Its field of each of the B characters.
     """
 
     rays: RenderOutput
-    surface_rgb: Tensor | None
-    surface_alpha: Tensor | None
-    space_alpha: Tensor | None
+    fields: Sequence[AbstractField]
+
+    def answer(self, query: Query) -> FieldOutput:
+        """Colours (B, P, 3) and densities (B, P) at the query's points."""
+        triples = zip(self.fields, query.points, query.directions, strict=True)
+        answers = [field(points, directions) for field, points, directions in triples]
+        return FieldOutput(
+            rgb=torch.stack([one.rgb for one in answers]),
+            densities=torch.stack([one.densities for one in answers]),
+        )
 
 
 @final
 class WeightedLosses:
-    """Sum over coarse and fine of weighted terms; a term of weight 0 is neither computed nor its data read.
+    """Sum over coarse and fine of weighted terms; what weighs 0 is neither computed nor its data read.
 
     Args:
-        weights: By term: reconstruction, surface_rgb, surface_alpha, opacity, depth, occupancy. Terms not named weigh 0.
+        terms: By their names in the config.
 
     Raises:
-        ConfigError: If a term is unknown.
-
-    Source: paper, Final Loss function (reconstruction 1.0; surface_rgb and surface_alpha 0.1); the others are beyond the paper.
+        ConfigError: If two terms name a value alike.
     """
 
-    def __init__(self, *, weights: Mapping[str, float]) -> None:
-        unknown = sorted(set(weights) - set(TERMS))
-        if unknown:
-            raise ConfigError(
-                f"loss.weights.{unknown[0]}: found an unknown term, expected one of {', '.join(TERMS)}."
-            )
-        self.weights = dict(weights)
+    def __init__(self, terms: Mapping[str, AbstractTerm]) -> None:
+        self.terms = tuple(terms.values())
+        self.weights: dict[str, float] = {}
+        for key, term in terms.items():
+            for name in term.weights.keys() & self.weights.keys():
+                raise ConfigError(f"loss.{key}: found a second value named {name}, expected each name once.")
+            self.weights |= term.weights
 
-    def active(self, overrides: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Terms that count, with a phase's overrides applied."""
-        merged = {**self.weights, **(overrides or {})}
-        return {term: weight for term, weight in merged.items() if weight > 0}
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the values, in the order of the terms."""
+        return tuple(self.weights)
 
-    def reads(self, term: str) -> bool:
-        """Whether a term counts before overrides: what the data must bring."""
-        return self.weights.get(term, 0.0) > 0
+    def active(self, overrides: Mapping[str, float]) -> dict[str, float]:
+        """Weights above 0 by the names of their values, with a phase's overrides applied."""
+        return {name: weight for name, weight in {**self.weights, **overrides}.items() if weight > 0}
 
-    def __call__(self, passes: list[PassOutput], batch: TrainBatch) -> tuple[Tensor, dict[str, Tensor]]:
-        """Total and unweighted terms (each summed over the passes)."""
-        terms: dict[str, Tensor] = {}
-        for term in self.active(batch.loss_weights):
-            values = [value for one in passes if (value := _term(term, one, batch)) is not None]
-            if values:
-                terms[term] = sum(values[1:], start=values[0])
+    def needs(self, schedule: PhaseSchedule) -> Needs:
+        """What the terms read that weigh above 0 in some phase of a run.
+
+        Raises:
+            ConfigError: If a phase weighs a value that no term has.
+        """
+        needs = Needs()
+        for index, phase in enumerate(schedule.phases):
+            for name in phase.loss_weights.keys() - self.weights.keys():
+                raise ConfigError(
+                    f"schedule.phases.{index}.loss_weights.{name}: found no such value, expected one of {', '.join(self.names)}."
+                )
+            active = self.active(phase.loss_weights)
+            for term in self.terms:
+                if active.keys() & term.weights.keys():
+                    needs |= term.needs
+        return needs
+
+    def __call__(
+        self, passes: Sequence[Pass], batch: TrainBatch, generator: torch.Generator
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Total () and unweighted values (), each summed over the passes.
+
+        Args:
+            passes: The fine one, and the coarse one where there are two.
+            batch: Of the step.
+            generator: Randomness of the step, on the CPU.
+        """
         weights = self.active(batch.loss_weights)
-        total = sum(
-            (weights[term] * value for term, value in terms.items()), start=passes[0].rays.rgb.new_zeros(())
-        )
-        return total, terms
-
-
-def _term(term: str, one: PassOutput, batch: TrainBatch) -> Tensor | None:  # noqa: PLR0911 (one line a term)
-    """One unweighted term of one pass; None where its data is missing (a character without a mesh)."""
-    match term:
-        case "reconstruction":
-            return squared_color_error(one.rays.rgb, batch.rgb)
-        case "opacity":
-            return squared_opacity_error(one.rays.opacity, batch.alpha)
-        case "depth" if batch.depth is not None:
-            return absolute_depth_error(one.rays.depth, batch.depth, one.rays.opacity)
-        case "surface_rgb" if one.surface_rgb is not None and batch.surface is not None:
-            return squared_color_error(one.surface_rgb, batch.surface.rgb)
-        case "surface_alpha" if one.surface_alpha is not None:
-            return absolute_alpha_error(one.surface_alpha, one.surface_alpha.new_ones(()))
-        case "occupancy" if one.space_alpha is not None and batch.space is not None:
-            return balanced_occupancy_error(one.space_alpha, batch.space.inside)
-    return None
+        values: dict[str, Tensor] = {}
+        for term in self.terms:
+            if weights.keys().isdisjoint(term.weights):
+                continue
+            query = term.query(batch, generator)
+            for one in passes:
+                answer = None if query is None else one.answer(query)
+                for name, value in term.values(one.rays, answer, batch).items():
+                    if name in weights:
+                        values[name] = values[name] + value if name in values else value
+        weighted = (weights[name] * value for name, value in values.items())
+        return sum(weighted, start=passes[0].rays.rgb.new_zeros(())), values

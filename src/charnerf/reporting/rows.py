@@ -111,9 +111,9 @@ def _key(override: str) -> str:
 
 
 def _short_names(own: Sequence[Sequence[str]]) -> dict[str, str]:
-    """Last part of every key that rows differ in; the whole key where two end alike."""
+    """Every key that rows differ in, without its section; the whole key where two end alike."""
     keys = list(dict.fromkeys(_key(one) for each in own for one in each))
-    last = [key.split(".")[-1] for key in keys]
+    last = [key.split(".", maxsplit=1)[-1] for key in keys]
     return {key: key if last.count(short) > 1 else short for key, short in zip(keys, last, strict=True)}
 
 

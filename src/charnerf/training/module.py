@@ -12,18 +12,15 @@ from charnerf.data.sampler import Position, step_seed
 from charnerf.data.validation import ValidationView
 from charnerf.errors import ConfigError
 from charnerf.evaluation.metrics import psnr, psnr_foreground, ssim
-from charnerf.losses.directions import AbstractDirections
-from charnerf.losses.total import PassOutput, WeightedLosses
+from charnerf.losses.total import Pass, WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.scene import AbstractField
 from charnerf.types import RenderOutput, TrainBatch
-from charnerf.volume.compositing import alphas_from_densities
 from charnerf.volume.renderers.base import AbstractRenderer
 
 OptimizerOf = Callable[[Iterable[torch.nn.Parameter] | list[dict[str, Any]]], torch.optim.Optimizer]
 WARM_UP = 0.01  # share of the run in which the learning rate rises
-SPACE_DELTA = 0.02  # m: thickness at which a labelled point inside shall be opaque
 
 
 class TrainingModule(L.LightningModule):
@@ -34,11 +31,9 @@ class TrainingModule(L.LightningModule):
         renderer: Renders the training rays.
         eval_renderer: Renders validation pictures.
         losses: Terms and weights.
-        surface_dirs: Along which directions surface points are looked at.
         optimizer: Makes the optimiser of parameters.
         final_rate: Learning rate at the end of the run over that at the start (cosine between them).
         position: Where the run stands.
-        surface_delta: Interval length at which surface points' alpha is taken, m (paper: depth range over samples a ray).
         seed: Of the run; with the step it seeds the jitter of the samples.
     """
 
@@ -49,11 +44,9 @@ class TrainingModule(L.LightningModule):
         renderer: AbstractRenderer,
         eval_renderer: AbstractRenderer,
         losses: WeightedLosses,
-        surface_dirs: AbstractDirections,
         optimizer: OptimizerOf,
         final_rate: float,
         position: Position,
-        surface_delta: float,
         seed: int,
     ) -> None:
         super().__init__()
@@ -61,11 +54,9 @@ class TrainingModule(L.LightningModule):
         self.renderer = renderer
         self.eval_renderer = eval_renderer
         self.losses = losses
-        self.surface_dirs = surface_dirs
         self.make_optimizer = optimizer
         self.final_rate = final_rate
         self.position = position
-        self.surface_delta = surface_delta
         self.seed = seed
         self.last_opacity = math.nan  # mean over the rays of the last batch that show the character
 
@@ -75,12 +66,11 @@ class TrainingModule(L.LightningModule):
         encoded = self.model.encode(batch.views, batch.hull)
         scenes = [self.model.scene(encoded, index) for index in range(len(batch.names))]
         renderings = [self.renderer.render(scene, batch.rays[b], generator) for b, scene in enumerate(scenes)]
-        dirs = self._surface_dirs(batch, generator)
-        passes = [self._pass([r.finest for r in renderings], [s.field for s in scenes], dirs, batch)]
+        passes = [_pass([r.finest for r in renderings], [s.field for s in scenes])]
         if renderings[0].coarse is not None:
             coarse = [r.coarse for r in renderings if r.coarse is not None]
-            passes.append(self._pass(coarse, [s.coarse for s in scenes], dirs, batch))
-        loss, terms = self.losses(passes, batch)
+            passes.append(_pass(coarse, [s.coarse for s in scenes]))
+        loss, terms = self.losses(passes, batch, generator)
         self.last_opacity = _seen_opacity(passes[0].rays.opacity.detach(), batch.alpha)
         now = self.position()
         logged: dict[str, Tensor | float] = {
@@ -96,47 +86,6 @@ class TrainingModule(L.LightningModule):
         }
         self.log_dict(logged, batch_size=1)
         return loss
-
-    def _surface_dirs(self, batch: TrainBatch, generator: torch.Generator) -> list[Tensor]:
-        """Query directions (P, 3) of each character's surface points; none without points."""
-        if batch.surface is None:
-            return []
-        pairs = zip(batch.surface.points, batch.rays.origins, strict=True)
-        return [self.surface_dirs(points, origins, generator) for points, origins in pairs]
-
-    def _pass(
-        self,
-        outputs: list[RenderOutput],
-        fields: list[AbstractField],
-        surface_dirs: list[Tensor],
-        batch: TrainBatch,
-    ) -> PassOutput:
-        """What one of the two passes answers to rays and points."""
-        active = self.losses.active(batch.loss_weights)
-        surface_rgb = surface_alpha = space_alpha = None
-        if batch.surface is not None and not active.keys().isdisjoint({"surface_rgb", "surface_alpha"}):
-            answers = [
-                field(p, d) for field, p, d in zip(fields, batch.surface.points, surface_dirs, strict=True)
-            ]
-            surface_rgb = torch.stack([answer.rgb for answer in answers])
-            densities = torch.stack([answer.densities for answer in answers])
-            surface_alpha = alphas_from_densities(densities, torch.full_like(densities, self.surface_delta))
-        if batch.space is not None and "occupancy" in active:
-            densities = torch.stack(
-                [
-                    field(p, torch.zeros_like(p)).densities
-                    for field, p in zip(fields, batch.space.points, strict=True)
-                ]
-            )
-            space_alpha = alphas_from_densities(densities, torch.full_like(densities, SPACE_DELTA))
-        rays = RenderOutput(
-            rgb=torch.stack([o.rgb for o in outputs]),
-            opacity=torch.stack([o.opacity for o in outputs]),
-            depth=torch.stack([o.depth for o in outputs]),
-        )
-        return PassOutput(
-            rays=rays, surface_rgb=surface_rgb, surface_alpha=surface_alpha, space_alpha=space_alpha
-        )
 
     def validation_step(self, view: ValidationView, batch_idx: int) -> None:
         """Render one picture of a validation character and measure it."""
@@ -189,6 +138,16 @@ def rate_at(progress: float, *, final: float) -> float:
     """Factor on the learning rate: rises from 1/20 to 1 in the first hundredth of the run, then a cosine to `final`."""
     rise = min(1.0, 0.05 + 0.95 * progress / WARM_UP)
     return rise * (final + (1.0 - final) * 0.5 * (1.0 + math.cos(math.pi * progress)))
+
+
+def _pass(outputs: list[RenderOutput], fields: list[AbstractField]) -> Pass:
+    """A pass of the renderings and fields of all characters."""
+    rays = RenderOutput(
+        rgb=torch.stack([one.rgb for one in outputs]),
+        opacity=torch.stack([one.opacity for one in outputs]),
+        depth=torch.stack([one.depth for one in outputs]),
+    )
+    return Pass(rays, fields)
 
 
 def _seen_opacity(opacity: Tensor, alpha: Tensor) -> float:

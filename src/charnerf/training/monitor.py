@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, final
 
@@ -13,13 +14,20 @@ from tqdm import tqdm
 
 from charnerf.data.validation import ValidationView
 from charnerf.files import write_text
-from charnerf.losses.total import TERMS
 from charnerf.pictures import on_white
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
 from charnerf.types import RenderOutput
 
-CURVE_COLUMNS = ("step", "phase", "seconds", "rays", "val_psnr", "val_psnr_foreground", "val_ssim", *TERMS)
+CURVE_COLUMNS = (
+    "step",
+    "phase",
+    "seconds",
+    "rays",
+    "val_psnr",
+    "val_psnr_foreground",
+    "val_ssim",
+)  # then the losses
 PICTURES = 4
 
 
@@ -76,11 +84,13 @@ class CurveWriter(L.Callback):
     Args:
         path: The file.
         clock: Of the run.
+        values: Names of the loss's values, a column each.
     """
 
-    def __init__(self, *, path: Path, clock: RunClock) -> None:
+    def __init__(self, *, path: Path, clock: RunClock, values: Sequence[str]) -> None:
         self.path = path
         self.clock = clock
+        self.values = values
         self.rows: list[dict[str, float | int | str]] = []
 
     def on_validation_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
@@ -98,10 +108,10 @@ class CurveWriter(L.Callback):
         }
         row |= {"phase": read("train/phase"), "rays": read("train/rays")}
         row |= {name: read(f"val/{name[4:]}") for name in ("val_psnr", "val_psnr_foreground", "val_ssim")}
-        row |= {term: read(f"train/loss/{term}") for term in TERMS}
+        row |= {term: read(f"train/loss/{term}") for term in self.values}
         self.rows.append(row)
         text = io.StringIO()
-        writer = csv.DictWriter(text, fieldnames=CURVE_COLUMNS, lineterminator="\n")
+        writer = csv.DictWriter(text, fieldnames=[*CURVE_COLUMNS, *self.values], lineterminator="\n")
         writer.writeheader()
         writer.writerows(self.rows)
         write_text(self.path, text.getvalue())

@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from charnerf.data.surface import AbstractSurface
 from charnerf.errors import ConfigError
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.inference.weights import save_config, save_weights
+from charnerf.losses.base import Needs
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.surfaces.mesh_files import load_surface_mesh
@@ -39,7 +40,6 @@ from charnerf.volume.renderers.base import AbstractRenderer
 log = logging.getLogger(__name__)
 START_FILE = "start.txt"  # where the weights of a run began, if that was not random
 CHECKPOINT_EVERY = timedelta(minutes=5)  # at least; validations write checkpoints too
-SURFACE_TERMS = ("surface_rgb", "surface_alpha")
 HYPER_METRICS = ("val/psnr", "val/psnr_foreground", "val/ssim")  # columns beside the hyper-parameters
 
 
@@ -55,10 +55,10 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
     save_config(folder, cfg)
-    losses: WeightedLosses = build_part(cfg.loss)
+    losses, needs = build_losses(cfg)
     model = build_model(cfg)
     start = begin(model, cfg) if checkpoint is None else None
-    root = build_part(cfg.data).prepare(depth=reads(cfg, losses, "depth"))
+    root = build_part(cfg.data).prepare(depth=needs.depth)
     check_data(root, cfg.splits, cfg.scale.image_size)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
@@ -67,15 +67,13 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         renderer=training_renderer(cfg),
         eval_renderer=renderer,
         losses=losses,
-        surface_dirs=build_part(cfg.surface_dirs),
         optimizer=build_part(cfg.optimizer),
         final_rate=cfg.optimization.final_lr_scale,
         position=clock.position,
-        surface_delta=surface_delta(cfg),
         seed=cfg.seed,
     )
-    data = build_data(cfg, root, model, clock, losses)
-    trainer = build_trainer(cfg, folder, clock)
+    data = build_data(cfg, root, model, clock, needs)
+    trainer = build_trainer(cfg, folder, clock, losses.names)
     if trainer.is_global_zero:
         log_hyperparameters(trainer, cfg, model)
         if start is not None:
@@ -115,10 +113,16 @@ def check_data(root: Path, splits: DictConfig, size: int) -> None:
         )
 
 
+def build_losses(cfg: DictConfig) -> tuple[WeightedLosses, Needs]:
+    """The loss, and what its terms need in any phase of the run."""
+    losses = WeightedLosses({str(name): build_part(term) for name, term in cfg.loss.items()})
+    return losses, losses.needs(build_part(cfg.schedule))
+
+
 def build_data(
-    cfg: DictConfig, root: Path, model: CharNeRF, clock: RunClock, losses: WeightedLosses
+    cfg: DictConfig, root: Path, model: CharNeRF, clock: RunClock, needs: Needs
 ) -> MixedDataModule:
-    """The datamodule; what no loss reads is not opened."""
+    """The datamodule; what no loss needs is not opened."""
     splits, batches, validation = cfg.splits, cfg.batches, cfg.validation
 
     def make_dataset(store: CharacterStore) -> MixedDataset:
@@ -126,8 +130,7 @@ def build_data(
             store=store,
             characters=cfg.scale.batch_characters,
             foreground_share=batches.foreground_share,
-            space_points=cfg.sampling.space_points if reads(cfg, losses, "occupancy") else 0,
-            reads_depth=reads(cfg, losses, "depth"),
+            needs=needs,
             used_views=model.views,
             augmentation=AugmentationSequence(
                 [build_part(one, {"used_views": model.views}) for one in cfg.augmentation.values()]
@@ -144,7 +147,7 @@ def build_data(
         carve=model.carve,
         memory_mib=batches.memory_mib,
         workers=batches.workers,
-        surface_of=_surface_of(cfg, losses),
+        surface_of=_surface_of(cfg) if needs.surface else no_surface,
         make_dataset=make_dataset,
         sampler=PhaseSampler(
             schedule=build_part(cfg.schedule), position=clock.position, num_marks=validation.times
@@ -152,16 +155,8 @@ def build_data(
     )
 
 
-def reads(cfg: DictConfig, losses: WeightedLosses, *terms: str) -> bool:
-    """Whether any of these loss terms counts in any phase: what the data must bring."""
-    phases = [phase.get("loss_weights", {}) for phase in cfg.schedule.phases]
-    return any(losses.reads(term) or any(phase.get(term, 0) > 0 for phase in phases) for term in terms)
-
-
-def _surface_of(cfg: DictConfig, losses: WeightedLosses) -> SurfaceOf:
-    """Opens a character's surface; None without a loss that reads it or without a mesh, which is said once."""
-    if not reads(cfg, losses, *SURFACE_TERMS):
-        return no_surface
+def _surface_of(cfg: DictConfig) -> SurfaceOf:
+    """Opens a character's surface; None without a mesh, which is logged once."""
     make_surface: Callable[..., AbstractSurface] = build_part(cfg.surface)
     told: set[str] = set()
 
@@ -176,8 +171,15 @@ def _surface_of(cfg: DictConfig, losses: WeightedLosses) -> SurfaceOf:
     return surface_of
 
 
-def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
-    """Lightning's trainer with our callbacks; the budget, not Lightning, bounds the run."""
+def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock, values: Sequence[str]) -> L.Trainer:
+    """Lightning's trainer with our callbacks; the budget, not Lightning, bounds the run.
+
+    Args:
+        cfg: Of the run.
+        folder: The run folder.
+        clock: Of the run.
+        values: Names of the loss's values.
+    """
     averages = [] if cfg.averaging.decay is None else [WeightAverage(decay=cfg.averaging.decay)]
     callbacks = [
         clock,
@@ -185,7 +187,7 @@ def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock) -> L.Trainer:
         BudgetBar(clock=clock),
         FiniteGuard(folder=folder),
         WhiteAlarm(),
-        CurveWriter(path=folder / "curve.csv", clock=clock),
+        CurveWriter(path=folder / "curve.csv", clock=clock, values=values),
         PictureLogger(),
         ModelCheckpoint(
             dirpath=folder / "checkpoints",
@@ -224,17 +226,6 @@ def training_renderer(cfg: DictConfig) -> AbstractRenderer:
     changed = cfg.copy()
     changed.renderer.num_coarse = cfg.scale.train_num_coarse
     return build_renderer(changed)
-
-
-def surface_delta(cfg: DictConfig) -> float:
-    """Interval length of a surface point, m.
-
-    Source: paper, Mix of 2d ray sampling and 3d surface sampling: (z_far - z_near) / (n_coarse + n_fine), real depths;
-    `sampling.surface_delta` where that is set.
-    """
-    if cfg.sampling.surface_delta is not None:
-        return float(cfg.sampling.surface_delta)
-    return 2.0 * cfg.model.box_half_extent / (cfg.scale.train_num_coarse + cfg.renderer.num_fine)
 
 
 def find_checkpoint(ckpt_path: str | None, folder: Path) -> Path | None:

@@ -1,0 +1,43 @@
+"""A term of the loss from outside: one class and one line of config."""
+
+import csv
+
+from support import small_runs
+
+TERM = '''"""Fields shall be thin at the character's feet."""
+
+import torch
+
+from charnerf.losses.base import AbstractTerm, Needs, Query
+
+
+class Thin(AbstractTerm):
+    """Mean density at the origin, 1/m."""
+
+    def __init__(self, *, weight: float) -> None:
+        self.weights = {"thin": weight}
+        self.needs = Needs()
+
+    def query(self, batch, generator):
+        origin = torch.zeros(len(batch.names), 1, 3)
+        return Query(origin, origin)
+
+    def values(self, rays, answer, batch):
+        return {"thin": answer.densities.mean()}
+'''
+
+
+def test_a_term_from_outside_is_trained_and_logged(figure_dataset, tmp_path, monkeypatch):
+    (tmp_path / "thin_lab.py").write_text(TERM)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    mine = (
+        "trusted_targets=[thin_lab]",
+        "+loss.thin={_target_:thin_lab.Thin,weight:0.5}",
+        "validation.times=2",
+    )
+    run = small_runs.assemble(small_runs.smoke_config(figure_dataset, *mine), tmp_path / "run").fit()
+    assert "train/loss/thin" in run.trainer.callback_metrics
+    with (tmp_path / "run/curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[-2:] == ["occupancy", "thin"]
+    assert float(rows[0]["thin"]) > 0.0
