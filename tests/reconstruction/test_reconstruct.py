@@ -47,8 +47,8 @@ class FakeModel:
     def __init__(self, density: float = 1.0) -> None:
         self.density = density
 
-    def encode(self, *, front, side, back, side_is) -> Hero:
-        read = read_views(turnaround(front, side, back, side_is=side_is), size=64)
+    def encode_drawings(self, drawings, *, reconciled) -> Hero:
+        read = read_views(drawings, size=64, reconciled=reconciled)
         hull = build_hull(read.views, box_min=BOX[0], box_max=BOX[1], grid_size=32)[0]
 
         def field(points, view_dirs):
@@ -77,9 +77,18 @@ OPTIONS = ReconstructionOptions(mesh=MESH, frames=6, size=48)
 
 
 def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
-    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **drawings)
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["drawings.png", "mesh.glb", "meshes", "report.md", done.turntable.name, "views"]
+    assert names == [
+        "drawings.png",
+        "mesh.glb",
+        "meshes",
+        "report.md",
+        "sheet.png",
+        done.turntable.name,
+        "views",
+    ]
+    assert Image.open(tmp_path / "out" / "sheet.png").size == (8 * 48, 2 * (48 + 20) + 12)
     assert Image.open(tmp_path / "out" / "meshes" / "mesh_sheet.png").width > 1000
     assert sorted(v.name for v in done.views) == [f"{60 * k:03d}.png" for k in range(6)]
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
@@ -95,7 +104,7 @@ def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
 
 def test_the_mesh_wears_the_drawings(tmp_path, drawings):
     """The field is red in front and green behind; the side drawing is orange, which the field never is."""
-    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **drawings)
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
     uv = np.asarray(mesh.visual.uv)
     colours = read_texture(mesh.visual.material.baseColorTexture, uv)
@@ -103,12 +112,12 @@ def test_the_mesh_wears_the_drawings(tmp_path, drawings):
     assert left.any()
     np.testing.assert_allclose(np.median(colours[left], axis=0), (1.0, 165 / 255, 0.0), atol=0.02)
     in_vertices = replace(OPTIONS, mesh=replace(MESH, texture="vertex"))
-    plain = reconstruct(FakeModel(), tmp_path / "plain", in_vertices, **drawings)
+    plain = reconstruct(FakeModel(), tmp_path / "plain", in_vertices, turnaround(**drawings))
     assert trimesh.load(plain.mesh, force="mesh").visual.material.baseColorTexture is None
 
 
 def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
-    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **drawings)
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
     text = done.report.read_text()
     for words in (
         "floor line",
@@ -131,7 +140,7 @@ def test_a_second_run_replaces_its_pieces_and_nothing_else(tmp_path, drawings):
     (output / "turntable.gif").write_text("old")
     (output / "views").mkdir()
     (output / "views" / "007.png").write_text("old")
-    reconstruct(FakeModel(), output, OPTIONS, **drawings)
+    reconstruct(FakeModel(), output, OPTIONS, turnaround(**drawings))
     assert (output / "notes.txt").read_text() == "mine"
     assert not (output / "views" / "007.png").exists()
     assert len(list(output.glob("turntable.*"))) == 1
@@ -140,13 +149,15 @@ def test_a_second_run_replaces_its_pieces_and_nothing_else(tmp_path, drawings):
 
 def test_nothing_is_left_of_a_failure(tmp_path, drawings):
     with pytest.raises(NumericalError, match="The field is empty"):
-        reconstruct(FakeModel(density=0.0), tmp_path / "out", OPTIONS, **drawings)
+        reconstruct(FakeModel(density=0.0), tmp_path / "out", OPTIONS, turnaround(**drawings))
     with pytest.raises(DataError, match=r"gone\.png"):
-        reconstruct(FakeModel(), tmp_path / "out", OPTIONS, **{**drawings, "side": tmp_path / "gone.png"})
+        reconstruct(
+            FakeModel(), tmp_path / "out", OPTIONS, turnaround(**{**drawings, "side": tmp_path / "gone.png"})
+        )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["back.png", "front.png", "side.png"]
     (tmp_path / "file").write_text("")
     with pytest.raises(DataError, match="found a file, expected a folder"):
-        reconstruct(FakeModel(), tmp_path / "file", OPTIONS, **drawings)
+        reconstruct(FakeModel(), tmp_path / "file", OPTIONS, turnaround(**drawings))
 
 
 def test_without_an_encoder_the_turntable_is_a_gif(tmp_path, monkeypatch):

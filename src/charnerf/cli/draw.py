@@ -17,6 +17,14 @@ def command(
     output: Folder,
     size: Annotated[int, typer.Option(min=32, max=4096, help="Side of every drawing, pixels.")] = 512,
     seed: Annotated[int, typer.Option(min=0, help="Another seed is another artist.")] = 0,
+    level: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=3,
+            help="How far views disagree: 0 as captured, 1 a careful hand, 2 limbs off by 10 degrees, 3 by 30 degrees.",
+        ),
+    ] = 1,
 ) -> None:
     """Draw characters of a data set as somebody would: DIR/front.png, side.png, back.png; DIR/NAME/ for several.
 
@@ -29,5 +37,5 @@ def command(
     drawn = [load_character(data, name) for name in character]
     for one in drawn:
         folder = output / one.name if len(drawn) > 1 else output
-        files = write_drawings(draw_character(one, size=size, seed=seed), folder)
+        files = write_drawings(draw_character(one, size=size, seed=seed, level=level), folder)
         say(", ".join(str(file) for file in files))

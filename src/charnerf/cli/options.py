@@ -63,18 +63,6 @@ Sources = Annotated[
     Literal["orthographic", "pinhole"], typer.Option(help="Projection of the front, side and back views.")
 ]
 Depth = Annotated[bool, typer.Option("--depth", help="Write depth pictures too (16 bit, mm).")]
-Front = Annotated[
-    Path, typer.Argument(metavar="FRONT", exists=True, dir_okay=False, help="Front view, an image.")
-]
-Side = Annotated[Path, typer.Argument(metavar="SIDE", exists=True, dir_okay=False, help="Side view.")]
-Back = Annotated[Path, typer.Argument(metavar="BACK", exists=True, dir_okay=False, help="Back view.")]
-SideShows = Annotated[
-    Literal["left", "right"],
-    typer.Option(
-        "--side",
-        help="Which side of the character SIDE shows; left: its face looks to the picture's left.",
-    ),
-]
 Cameras = Annotated[int, typer.Option(help="Cameras whose directions the density is averaged over.")]
 Height = Annotated[
     float | None, typer.Option(metavar="M", help="Exact height of the mesh, m; its lowest point is at 0.")

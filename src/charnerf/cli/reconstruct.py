@@ -1,22 +1,19 @@
-"""`charnerf reconstruct`: three drawings to a mesh, a turntable, views and a report."""
+"""`charnerf reconstruct`: drawings or a sheet to a mesh, a turntable, views and a report."""
 
 from typing import Annotated
 
 import typer
 
+from charnerf.cli.drawings import AsDrawn, FigureOf, Files, Order, Seen, SideShows, given_drawings
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import (
-    Back,
     Cameras,
     Colors,
     Device,
     Folder,
-    Front,
     Height,
     Resolution,
-    Side,
-    SideShows,
     Size,
     Smooth,
     Symmetric,
@@ -29,13 +26,15 @@ from charnerf.reconstruction.options import LIGHT, ReconstructionOptions
 
 
 def command(
-    front: Front,
-    side: Side,
-    back: Back,
+    drawings: Files = None,
     *,
     output: Folder,
-    weights: WeightsOption = None,
     side_shows: SideShows = "left",
+    view: Seen = None,
+    order: Order = None,
+    figure: FigureOf = None,
+    as_drawn: AsDrawn = False,
+    weights: WeightsOption = None,
     resolution: Resolution = LIGHT.resolution,
     faces: Annotated[int | None, typer.Option(help="Faces of the mesh after decimation.")] = LIGHT.faces,
     frames: Annotated[
@@ -59,11 +58,13 @@ def command(
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
-    """Turn three drawings into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.md.
+    """Turn drawings, or a sheet, into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.md.
 
     The images have alpha or a plain background, any sizes and crops: figures are cut out and brought to one
-    height and floor line. What was assumed is printed, and drawn in the report.
+    height and floor line, and where views disagree the later ones are moved to the earlier ones. What was assumed
+    is printed, and drawn in the report.
     """
+    given = given_drawings(drawings, view, side_shows=side_shows, order=order, figures=figure, say=say)
     mesh = MeshOptions(
         resolution=resolution,
         num_cameras=cameras,
@@ -77,5 +78,7 @@ def command(
     from charnerf.reconstruction.folder import reconstruct
 
     model = load_model(weights, device=device, trust=trust)
-    done = reconstruct(model, output, options, front=front, side=side, back=back, side_is=side_shows, say=say)
+    done = reconstruct(
+        model, output, options, given.drawings, reconciled=not as_drawn, sheet=given.sheet, say=say
+    )
     say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")

@@ -1,12 +1,13 @@
-"""Three drawings and weights to a folder of adapted weights: what `charnerf finetune` does."""
+"""Drawings and weights to a folder of adapted weights: what `charnerf finetune` does."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from tqdm import tqdm
 
+from charnerf.drawings.turnaround import Picture
+from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
 from charnerf.finetuning.finetune import CurvePoint, Finetuned, finetune
 from charnerf.finetuning.recipe import Recipe
@@ -33,25 +34,19 @@ def refine(model: Model, hero: Hero, seconds: float, *, recipe: Recipe | None = 
 
 def finetune_drawings(
     model: Model,
+    given: Mapping[Viewpoint, Picture],
     *,
-    front: Path,
-    side: Path,
-    back: Path,
     output: Path,
     seconds: float,
-    side_is: Literal["left", "right"] = "left",
     say: Callable[[str], object],
 ) -> Finetuned:
     """Adapt a model to a character's drawings and write the folder.
 
     Args:
         model: Starting weights.
-        front: Front drawing.
-        side: Side drawing.
-        back: Back drawing.
+        given: Drawings by where they are seen from.
         output: Folder; made if missing.
         seconds: Time for it.
-        side_is: Which side of the character the side drawing shows.
         say: Gets what was assumed and what happened, sentence by sentence.
 
     Raises:
@@ -59,7 +54,7 @@ def finetune_drawings(
     """
     if output.exists() and not output.is_dir():
         raise DataError(f"{output}: found a file, expected a folder to write to. Choose another.")
-    hero = model.encode(front=front, side=side, back=back, side_is=side_is)
+    hero = model.encode_drawings(given)
     drawings = hero.turnaround
     assert drawings is not None  # encode made it
     for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, final
 
-import numpy as np
 import torch
 
-from charnerf.drawings.turnaround import read_views
-from charnerf.drawings.viewpoints import turnaround
-from charnerf.errors import ShapeError
+from charnerf.drawings.turnaround import Picture, read_views
+from charnerf.drawings.viewpoints import Viewpoint, turnaround, viewpoint
+from charnerf.errors import DataError, ShapeError
 from charnerf.inference.hero import Hero
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
-
-Picture = str | Path | np.ndarray
 
 
 @final
@@ -54,9 +52,15 @@ class Model:
         return replace(self, network=self.network.to(device))
 
     def encode(
-        self, *, front: Picture, side: Picture, back: Picture, side_is: Literal["left", "right"] = "left"
+        self,
+        *,
+        front: Picture | None = None,
+        side: Picture | None = None,
+        back: Picture | None = None,
+        side_is: Literal["left", "right"] = "left",
+        views: Mapping[str | float, Picture] | None = None,
     ) -> Hero:
-        """Encode one character from three drawings.
+        """Encode one character from two drawings or more.
 
         Args:
             front: Image file, or array (H, W, 3 or 4) of uint8 or of floats in [0, 1]; alpha or a plain
@@ -65,14 +69,30 @@ class Model:
             back: Seen from behind.
             side_is: Which side of the character the side drawing shows; left: the face looks to the picture's
                 left.
+            views: Further drawings, or all of them, by where they are seen from: a name such as "three-quarter-front", an
+                azimuth in degrees such as 45, or azimuth and elevation such as "45,20". Where drawings disagree, the first
+                rules: front, side, back, then these.
 
         Returns:
             The character; `hero.turnaround` says what was assumed about the drawings.
 
         Raises:
-            DataError: If a drawing can not be used; the message names its file.
+            DataError: If a drawing can not be used, two show one view or there are fewer than two.
         """
-        read = read_views(turnaround(front, side, back, side_is=side_is), size=self.image_size)
+        drawings = {
+            view: one
+            for view, one in turnaround(front, side, back, side_is=side_is).items()
+            if one is not None
+        }
+        for name, one in (views or {}).items():
+            if viewpoint(name) in drawings:
+                raise DataError(f"view {name}: found two drawings of it, expected one.")
+            drawings[viewpoint(name)] = one
+        return self.encode_drawings(drawings)
+
+    def encode_drawings(self, drawings: Mapping[Viewpoint, Picture], *, reconciled: bool = True) -> Hero:
+        """Encode one character from drawings by where they are seen from; arguments as of `drawings.turnaround.read_views`."""
+        read = read_views(drawings, size=self.image_size, reconciled=reconciled)
         hero = self.encode_views(read.views, detailed=read.detailed)
         return replace(hero, turnaround=read)
 

@@ -1,19 +1,19 @@
-"""Three drawings to a folder: mesh.glb, turntable.mp4, views and report.md."""
+"""Drawings to a folder: mesh.glb, turntable.mp4, views and report.md."""
 
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
-from charnerf.drawings.turnaround import Turnaround
+from charnerf.drawings.turnaround import Picture, Turnaround
+from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.finetune import Finetuned
@@ -24,6 +24,7 @@ from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.pictures import bytes_on_white
+from charnerf.reconstruction.model_sheet import model_sheet
 from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.reconstruction.progress import BAR, meter
 from charnerf.reconstruction.report import mesh_sentences, mesh_words, report_text
@@ -60,14 +61,13 @@ def reconstruct(
     model: Model,
     output: Path,
     options: ReconstructionOptions,
+    given: Mapping[Viewpoint, Picture],
     *,
-    front: Path,
-    side: Path,
-    back: Path,
-    side_is: Literal["left", "right"] = "left",
+    reconciled: bool = True,
+    sheet: np.ndarray | None = None,
     say: Callable[[str], object] = lambda line: None,
 ) -> Reconstruction:
-    """Reconstruct a character from three drawings into a folder.
+    """Reconstruct a character from drawings into a folder.
 
     Everything is written aside and then moved into the folder: a piece is there whole or not at all. Pieces
     of an earlier reconstruction are replaced, other files of the folder stay.
@@ -76,10 +76,9 @@ def reconstruct(
         model: Loaded, on its device.
         output: Folder; made if missing.
         options: What is made.
-        front: Front drawing.
-        side: Side drawing.
-        back: Back drawing.
-        side_is: Which side of the character the side drawing shows.
+        given: Drawings by where they are seen from; where they disagree, the first rules.
+        reconciled: Whether drawings that disagree are mended.
+        sheet: RGB picture of the sheet that they were found on, shown in the report; None where there was none.
         say: Gets what was assumed and made, sentence by sentence.
 
     Raises:
@@ -90,7 +89,7 @@ def reconstruct(
         raise DataError(f"{output}: found a file, expected a folder to write to. Choose another.")
     seconds: dict[str, float] = {}
     with _timed(seconds, "encode"):
-        hero = model.encode(front=front, side=side, back=back, side_is=side_is)
+        hero = model.encode_drawings(given, reconciled=reconciled)
     drawings = hero.turnaround
     assert drawings is not None  # encode made it
     for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
@@ -106,6 +105,8 @@ def reconstruct(
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
         say(line)
     with _aside(output) as folder:
+        if sheet is not None:
+            Image.fromarray(sheet).save(folder / "sheet_as_read.png")
         film, views = _write_pieces(folder, pictures, built, drawings, refined, seconds, model.source.name)
     return Reconstruction(
         mesh=output / "mesh.glb",
@@ -156,6 +157,7 @@ def _write_pieces(
     film, film_note = write_film([bytes_on_white(picture) for picture in pictures], folder)
     views = _write_views(pictures, folder / "views")
     Image.fromarray(drawings.picture).save(folder / "drawings.png")
+    model_sheet(drawings, pictures).save(folder / "sheet.png")
     if refined is not None:
         plot_curve(refined, folder / "refinement.png")
     text = report_text(
@@ -167,6 +169,7 @@ def _write_pieces(
         seconds=seconds,
         weights=weights,
         refined=refined,
+        from_sheet=(folder / "sheet_as_read.png").exists(),
     )
     (folder / "report.md").write_text(text, encoding="utf-8")
     return film.name, [view.name for view in views]

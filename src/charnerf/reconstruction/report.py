@@ -22,6 +22,7 @@ def report_text(
     seconds: dict[str, float],
     weights: str,
     refined: Finetuned | None = None,
+    from_sheet: bool = False,
 ) -> str:
     """The Markdown text of report.md; the files that it shows lie beside it.
 
@@ -34,9 +35,12 @@ def report_text(
         seconds: By stage.
         weights: Where the model came from.
         refined: How the weights were adapted to the drawings, if they were.
+        from_sheet: Whether they were found on a sheet, whose picture lies beside.
     """
     lines = ["# Reconstructed character", "", " ".join(_picture(view) for view in views[:4]), ""]
     lines += ["## What was assumed about the drawings", ""]
+    if from_sheet:
+        lines += ["![the sheet, its figures and what was left aside](sheet_as_read.png)", ""]
     lines += ["![the drawings, cut out and aligned](drawings.png)", ""]
     lines += [f"- {one}" for one in drawings.assumptions]
     lines += [f"- **warning**: {one}" for one in drawings.warnings]
@@ -46,6 +50,7 @@ def report_text(
     lines += [
         "- [meshes/mesh_sheet.png](meshes/mesh_sheet.png): the mesh from all sides, beside the drawings"
     ]
+    lines += ["- [sheet.png](sheet.png): a model sheet of the result, the drawings above"]
     lines += ["- [views](views): pictures with alpha, named by azimuth in degrees", ""]
     lines += _mesh_lines(built)
     if refined is not None:
