@@ -174,6 +174,14 @@ def test_the_same_command_means_the_same_folder():
     assert folder_of("seed=0,1", "hydra.sweep.dir=my/grid") == "my/grid"
 
 
+def test_the_order_of_swept_values_means_nothing():
+    assert folder_of("surface_dirs=random,zero") == folder_of("surface_dirs=zero,random")
+    assert folder_of("surface_dirs=random,zero") != folder_of("surface_dirs=random,camera")
+    assert folder_of("augmentation=[],[mirror,recolor]") == folder_of("augmentation=[mirror,recolor],[]")
+    assert folder_of("augmentation=[],[mirror,recolor]") != folder_of("augmentation=[],[recolor,mirror]")
+    assert folder_of("seed=range(0,3)") != folder_of("seed=range(0,4)")
+
+
 def test_only_what_is_swept_names_the_cells():
     grid = grid_command(["-m", "experiment=glob(*)", "data.root=/a/b", "hydra/launcher=joblib"])
     assert grid is not None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hydra.core.override_parser.types import ChoiceSweep, Override
 from omegaconf import DictConfig, OmegaConf
 
 from charnerf.config.hydra_internals import looks_only, read_arguments
@@ -35,7 +36,7 @@ def grid_command(arguments: Sequence[str]) -> GridCommand | None:
     """Find the grid that a command line of `train.py` asks for.
 
     The folder is `hydra.sweep.dir` where that is given, else `outputs/grid/<swept keys>-<hash>`, the hash being of all
-    overrides but Hydra's own: the order of the arguments and the launcher change nothing.
+    overrides but Hydra's own: the order of arguments, the order of swept values and the launcher change nothing.
 
     Args:
         arguments: As typed, without the program.
@@ -56,13 +57,20 @@ def grid_command(arguments: Sequence[str]) -> GridCommand | None:
     if SETTABLE[0] in parsed:
         folder = Path(str(parsed[SETTABLE[0]].value()))
     else:
-        text = "\n".join(sorted(one.input_line or "" for one in own.values()))
+        text = "\n".join(sorted(map(_without_order, own.values())))
         folder = GRIDS / f"{'+'.join(sorted(swept)) or 'one'}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
         more.append(f"{SETTABLE[0]}='{folder.as_posix()}'")
     if swept and SETTABLE[1] not in parsed:
         fixed = ",".join(f"'{key}'" for key in own if key not in swept)
         more.append(f"{SETTABLE[1]}=[{fixed}]")
     return GridCommand([*arguments, *more], folder)
+
+
+def _without_order(override: Override) -> str:
+    """An override's text, the values that it sweeps over sorted."""
+    if not isinstance(override.value(), ChoiceSweep):  # a glob or a range has no order of its own
+        return override.input_line or ""
+    return f"{override.get_key_element()}={','.join(sorted(override.sweep_string_iterator()))}"
 
 
 def config_hash(cfg: DictConfig) -> str:
