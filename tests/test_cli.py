@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from charnerf.cli import run
-from charnerf.config.command_line import run_door
+from charnerf.config.command_line import check_command_line, run_door
 from charnerf.config.composition import compose_config
 from charnerf.errors import ConfigError, DataError
 from charnerf.inference.build import build_model
@@ -309,3 +309,15 @@ def test_debug_shows_the_traceback_of_training_too(
     for arguments in (["--debug", "train", "combinator=nope"], ["train", "combinator=nope", "--debug"]):
         assert run(arguments) == 2
         assert "Traceback" in capsys.readouterr().err
+
+
+def test_drawings_of_another_size_are_named_before_any_work(
+    dataset: Path, conf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=r"image_size: found 64, expected 32.*capture MESHES .* --size 64"):
+        captured = ["data=folder", f"data.root={dataset}", "scale.image_size=64"]
+        check_command_line(["scale=smoke", *captured], conf=conf)
+    with pytest.raises(ConfigError, match=r"data\.size: found 16, expected scale\.image_size = 32"):
+        check_command_line(["scale=smoke", "data.size=16"], conf=conf)
+    assert not list(tmp_path.iterdir())

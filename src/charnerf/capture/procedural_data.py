@@ -14,6 +14,7 @@ from tqdm import tqdm
 from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_scene_to, made_by
 from charnerf.capture.parallel import in_processes
+from charnerf.data.base import AbstractData
 from charnerf.data.characters import remove_partial_characters
 from charnerf.data.layout import (
     DATASET_FILE,
@@ -93,7 +94,7 @@ def generate_dataset(
 
 
 @final
-class ProceduralData:
+class ProceduralData(AbstractData):
     """Embedded characters in a cache folder, generated on first use.
 
     Args:
@@ -130,6 +131,14 @@ class ProceduralData:
         return (
             self._cache / f"procedural-v{GENERATOR_VERSION}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
         )
+
+    def check_image_size(self, size: int) -> None:
+        """Check the size that characters are generated in."""
+        found = self._settings["size"]
+        if found != size:
+            raise ConfigError(
+                f"data.size: found {found}, expected scale.image_size = {size}; leave data.size out, or set both."
+            )
 
     def prepare(self, *, depth: bool = False) -> Path:
         """Generate what is missing; the data set's folder.

@@ -65,19 +65,12 @@ def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> N
 
 
 def check_files(cfg: DictConfig) -> None:
-    """Check that the data set, the checkpoint and the weights that a valid config names are there.
+    """Check that the data set, the checkpoint and the weights that a valid config names are there and of its sizes.
 
     Raises:
         ConfigError: Names each one that is not.
     """
     problems = Problems()
-    root = OmegaConf.select(cfg, "data.root")
-    if root is not None and not (Path(root) / "dataset.json").is_file():
-        problems.add(
-            "data.root",
-            f"found no dataset.json in '{root}', expected a data set; `charnerf capture` "
-            "or `charnerf generate` makes one.",
-        )
     if cfg.ckpt_path not in (None, "last") and not Path(cfg.ckpt_path).is_file():
         problems.add(
             "ckpt_path", f"found '{cfg.ckpt_path}', which is no file; expected a .ckpt, `last` or null."
@@ -87,8 +80,13 @@ def check_files(cfg: DictConfig) -> None:
             "start_from",
             f"found '{cfg.start_from}', which does not exist; expected `released`, a run folder, a .ckpt, a .safetensors or null.",
         )
-    if problems.found:
-        raise ConfigError(as_message(problems.lines()))
+    lines = problems.lines()
+    try:
+        instantiate(cfg.data, _convert_="all").check_image_size(cfg.scale.image_size)
+    except ConfigError as error:
+        lines.append(str(error))
+    if lines:
+        raise ConfigError(as_message(lines))
 
 
 def warn_of_idle_settings(cfg: DictConfig) -> None:

@@ -3,13 +3,15 @@
 from pathlib import Path
 from typing import final
 
+from charnerf.data.base import AbstractData
 from charnerf.data.characters import DEPTH_FOLDER
-from charnerf.data.layout import read_dataset
-from charnerf.errors import DataError
+from charnerf.data.layout import DATASET_FILE, read_dataset
+from charnerf.data.transforms import read_transforms
+from charnerf.errors import ConfigError, DataError
 
 
 @final
-class FolderData:
+class FolderData(AbstractData):
     """A data set that is there already: captured, generated or from elsewhere.
 
     Args:
@@ -18,6 +20,25 @@ class FolderData:
 
     def __init__(self, *, root: str) -> None:
         self.root = Path(root)
+
+    def check_image_size(self, size: int) -> None:
+        """Check the first character's drawings."""
+        if not (self.root / DATASET_FILE).is_file():
+            raise ConfigError(
+                f"data.root: found no {DATASET_FILE} in '{self.root}', expected a data set; `charnerf capture` "
+                "or `charnerf generate` makes one."
+            )
+        names = [name for split in read_dataset(self.root).splits.values() for name in split]
+        if not names:
+            raise ConfigError(f"data.root: found no characters in '{self.root}', expected at least one.")
+        cameras = read_transforms(self.root / names[0]).source_cameras
+        found = max(cameras.width, cameras.height)
+        if found != size:
+            raise ConfigError(
+                f"scale.image_size: found {size}, expected {found}, the size of the drawings of {self.root} ({names[0]}: "
+                f"{cameras.width} x {cameras.height} pixels). Set scale.image_size={found}, or capture a data set of this size by "
+                f"`charnerf capture MESHES -o DATASET --split train --size {size}`."
+            )
 
     def prepare(self, *, depth: bool = False) -> Path:
         """Check that it is a data set and return its folder.

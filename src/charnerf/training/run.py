@@ -14,7 +14,8 @@ from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard.summary import hparams
 
 from charnerf.data.augmentation.sequence import AugmentationSequence
-from charnerf.data.characters import Character, load_character
+from charnerf.data.base import AbstractData
+from charnerf.data.characters import Character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
@@ -52,14 +53,16 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     """
     logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)  # the bar and the report say the rest
     L.seed_everything(cfg.seed, verbose=False)
+    source: AbstractData = build_part(cfg.data)
+    source.check_image_size(cfg.scale.image_size)
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
     save_config(folder, cfg)
     losses, needs = build_losses(cfg)
     model = build_model(cfg)
     start = begin(model, cfg) if checkpoint is None else None
-    root = build_part(cfg.data).prepare(depth=needs.depth)
-    check_data(root, cfg.splits, cfg.scale.image_size)
+    root = source.prepare(depth=needs.depth)
+    check_splits(root, cfg.splits)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = TrainingModule(
@@ -90,27 +93,15 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
 
 
-def check_data(root: Path, splits: DictConfig, size: int) -> None:
-    """Check what would end a run late, or make its weights useless.
-
-    Args:
-        root: Data set.
-        splits: The config's.
-        size: Width of the drawings that `charnerf reconstruct` will give the encoder, pixels.
+def check_splits(root: Path, splits: DictConfig) -> None:
+    """Check that every split that a run reads has characters; the last is read after training.
 
     Raises:
-        DataError: If a split that the run will read has no characters; the last is read after training.
-        ConfigError: If the first character's drawings have another size.
+        DataError: If one has none.
     """
     info = read_dataset(root)
-    first, *_ = [names_of(info, split)[0] for split in (*splits.train, splits.val, splits.test)]
-    cameras = load_character(root, first).sources.cameras
-    found = max(cameras.width, cameras.height)
-    if found != size:
-        raise ConfigError(
-            f"scale.image_size: found {size}, expected {found}, the size of the drawings of {root} ({first}: {cameras.width} x "
-            f"{cameras.height} pixels). Set scale.image_size={found}, or capture with --size {size}."
-        )
+    for split in (*splits.train, splits.val, splits.test):
+        names_of(info, split)
 
 
 def build_losses(cfg: DictConfig) -> tuple[WeightedLosses, Needs]:
