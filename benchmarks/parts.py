@@ -23,6 +23,7 @@ from benchmarks.roofline import roofline
 from benchmarks.scaling import growths
 from benchmarks.setting import Setting
 from benchmarks.steps import step_at_scale
+from benchmarks.threads import thread_rows
 from benchmarks.tricks import trick_methods
 from benchmarks.turntable import turntable
 from benchmarks.untrained import network_of, resized_network
@@ -180,6 +181,7 @@ PARTS: dict[str, Part] = {
         step_at_scale(setting.pictured[0], "small", repeats=3),
         step_at_scale(setting.pictured[0], "base", repeats=1),
     ],
+    "threads": lambda setting: thread_rows(setting.say),
     "losses": _losses,
     "grids": lambda setting: [
         {"character": one.name, **grid_share(one, cells=256, num_cameras=8).as_dict()}

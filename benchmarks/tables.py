@@ -181,6 +181,13 @@ SECTIONS: dict[str, tuple[str, Show]] = {
         ),
     ),
     "steps": ("Training steps", _steps),
+    "threads": (
+        "Threads beside other processes",
+        _table(
+            "Steps a second of `python train.py` at `scale=small`, alone and beside one busy process a core, medians of three runs "
+            "of 30 s in turns. `always`: OMP_NUM_THREADS is set."
+        ),
+    ),
     "losses": (
         "Loss curves",
         _table(

@@ -13,7 +13,7 @@ SHAPES = (
     (64, 4096, 64),
     (1024, 512, 512),
 )  # a layer, the gradient of its weights, a wide layer
-SPIN_COUNT = "100000"  # fewer cost time on idle cores: docs/speed.md
+SPIN_COUNT = "20000"  # a millisecond; fewer cost time on idle cores, more on busy ones: docs/speed.md
 
 
 def limit_spinning() -> None:

@@ -57,6 +57,7 @@ def test_the_run_folder_is_complete(run_folder):
     metrics = json.loads((run_folder / "metrics.json").read_text())
     assert metrics["split"] == "test" and list(metrics["per_character"]) == ["twin"]
     assert metrics["seconds"]["train"] > 0
+    assert metrics["environment"]["training_steps_by_threads"] == {str(torch.get_num_threads()): STEPS}
     assert load_config(run_folder).loss.depth.weight == 0.1
     model = load(run_folder)
     assert not model.network.training

@@ -23,6 +23,7 @@ from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
 from charnerf.reporting.run_report import write_run_report
 from charnerf.scene import Scene
+from charnerf.training.threads import ThreadTuner
 from charnerf.types import SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
@@ -37,6 +38,7 @@ def finish_run(
     renderer: AbstractRenderer,
     *,
     train_seconds: float,
+    threads: ThreadTuner,
     trainer: L.Trainer,
 ) -> None:
     """Evaluate the test split, write metrics.json, meshes/ and the report.
@@ -48,6 +50,7 @@ def finish_run(
         model: Trained, in eval mode.
         renderer: For evaluation.
         train_seconds: Training time, evaluation excluded.
+        threads: What the steps were taken with.
         trainer: Its logger gets the mesh.
     """
 
@@ -65,6 +68,7 @@ def finish_run(
         training=TrainingCharacters([(root, split) for split in cfg.splits.train]),
         train_seconds=train_seconds,
     )
+    metrics["environment"]["training_steps_by_threads"] = dict(threads.steps_by_threads)
     size = sum(parameter.numel() for parameter in model.parameters())
     write_metrics(folder / "metrics.json", {**metrics, "num_parameters": size, "steps": trainer.global_step})
     first = names_of(read_dataset(root), cfg.splits.test)[0]

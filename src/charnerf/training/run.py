@@ -36,6 +36,7 @@ from charnerf.training.guards import FiniteGuard, WhiteAlarm
 from charnerf.training.module import TrainingModule
 from charnerf.training.monitor import BudgetBar, CurveWriter, PictureLogger
 from charnerf.training.start import begin
+from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
@@ -44,6 +45,7 @@ CHECKPOINT_EVERY = timedelta(minutes=5)  # at least; validations write checkpoin
 HYPER_METRICS = ("val/psnr", "val/psnr_foreground", "val/ssim")  # columns beside the hyper-parameters
 
 
+@restored_threads()
 def run_training(cfg: DictConfig, folder: Path) -> None:
     """Train, evaluate and report into a run folder.
 
@@ -76,7 +78,8 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         seed=cfg.seed,
     )
     data = build_data(cfg, root, model, clock, needs)
-    trainer = build_trainer(cfg, folder, clock, losses.names)
+    threads = ThreadTuner(adapts=may_choose(budget_seconds=cfg.budget.seconds))
+    trainer = build_trainer(cfg, folder, clock, losses.names, threads)
     if trainer.is_global_zero:
         log_hyperparameters(trainer, cfg, model)
         if start is not None:
@@ -90,7 +93,16 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
         trainer.fit(module, datamodule=data, ckpt_path=checkpoint, weights_only=checkpoint is not None)
     if trainer.is_global_zero:
         save_weights(folder / "weights.safetensors", model, cfg)
-        finish_run(cfg, folder, root, model.eval(), renderer, train_seconds=clock.seconds, trainer=trainer)
+        finish_run(
+            cfg,
+            folder,
+            root,
+            model.eval(),
+            renderer,
+            train_seconds=clock.seconds,
+            threads=threads,
+            trainer=trainer,
+        )
 
 
 def check_splits(root: Path, splits: DictConfig) -> None:
@@ -162,7 +174,9 @@ def _surface_of(cfg: DictConfig) -> SurfaceOf:
     return surface_of
 
 
-def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock, values: Sequence[str]) -> L.Trainer:
+def build_trainer(
+    cfg: DictConfig, folder: Path, clock: RunClock, values: Sequence[str], *more: L.Callback
+) -> L.Trainer:
     """Lightning's trainer with our callbacks; the budget, not Lightning, bounds the run.
 
     Args:
@@ -170,10 +184,12 @@ def build_trainer(cfg: DictConfig, folder: Path, clock: RunClock, values: Sequen
         folder: The run folder.
         clock: Of the run.
         values: Names of the loss's values.
+        more: Further callbacks.
     """
     averages = [] if cfg.averaging.decay is None else [WeightAverage(decay=cfg.averaging.decay)]
     callbacks = [
         clock,
+        *more,
         *averages,  # before what reads the weights at validation
         BudgetBar(clock=clock),
         FiniteGuard(folder=folder),
