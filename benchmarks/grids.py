@@ -11,9 +11,9 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from charnerf.bench.subjects import Subject
-from charnerf.meshing.calibrate import choose_level
-from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.grid_sampler import GridSampler
+from charnerf.meshing.level import choose_level
 
 CUBE_SIDE = 2.2  # m
 SAME_DISTANCE = 1e-4  # m, between two surfaces that count as one

@@ -7,8 +7,8 @@ from typing import Any
 
 from benchmarks.grids import grid_sampler, hausdorff
 from charnerf.bench.subjects import Subject
-from charnerf.meshing.calibrate import choose_level
 from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.level import choose_level
 
 RESOLUTIONS = (64, 96, 128, 192)
 FINEST = 256

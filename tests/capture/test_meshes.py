@@ -72,7 +72,7 @@ def test_wrong_axes_are_named(tmp_path, up, facing):
         load_scene(tmp_path / "body.obj", up, facing)
 
 
-def test_dark_gltf_factors_keep_their_colour(tmp_path):
+def test_dark_gltf_factors_keep_their_color(tmp_path):
     """Linear 0.004 has one step of 8 bits: 13 in sRGB, where it should be 11."""
     file = tmp_path / "dark.gltf"
     mesh = trimesh.creation.box()
@@ -88,7 +88,7 @@ def test_dark_gltf_factors_keep_their_colour(tmp_path):
     np.testing.assert_allclose(factor, (0.0035, 0.0041, 0.0044, 1.0), rtol=1e-6)
 
 
-def test_ply_colours_are_srgb_and_glb_colours_linear(tmp_path):
+def test_ply_colors_are_srgb_and_glb_colors_linear(tmp_path):
     mesh = body(*Y_UP)
     mesh.visual.vertex_colors = (188, 188, 188, 255)
     mesh.export(tmp_path / "body.ply")

@@ -53,7 +53,7 @@ def test_a_cut_loses_no_surface_and_leaves_none_on_the_wrong_side(height):
     assert triangle_areas(above).sum() + triangle_areas(below).sum() == pytest.approx(whole, rel=1e-5)
 
 
-def test_cut_corners_have_the_colours_and_texture_places_of_where_they_are():
+def test_cut_corners_have_the_colors_and_texture_places_of_where_they_are():
     """Coordinates and colours that are linear in space stay so, and triangles keep their winding."""
     surface = figure((255, 255, 255), fine=0)
     linear = SurfaceMesh(
@@ -86,12 +86,12 @@ def test_each_part_comes_from_its_character(seed):
     np.testing.assert_allclose((low + high)[:2], 0.0, atol=1e-5)
     assert (np.diff(made.material_ids) >= 0).all()
     third = np.full(len(made.triangles), 1.0 / 3.0)
-    colours = shade(made, np.arange(len(third)), third, third)[:, :3]
+    colors = shade(made, np.arange(len(third)), third, third)[:, :3]
     middle = made.triangles.mean(1)
     trunk = np.abs(middle[:, 0]) < 0.3  # lowered hands may hang beside the legs
-    by_colour = [middle[trunk & (colours.argmax(1) == channel), 2] for channel in (2, 0, 1)]
-    assert all(len(part) for part in by_colour)
-    for lower, upper in itertools.pairwise(by_colour):
+    by_color = [middle[trunk & (colors.argmax(1) == channel), 2] for channel in (2, 0, 1)]
+    assert all(len(part) for part in by_color)
+    for lower, upper in itertools.pairwise(by_color):
         assert lower.max() <= upper.min() + 1e-3
 
 

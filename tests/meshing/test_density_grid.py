@@ -5,8 +5,9 @@ import pytest
 import torch
 
 from charnerf.errors import DataError, NumericalError
-from charnerf.meshing.density_grid import GridSampler, averaged_density, camera_positions
+from charnerf.meshing.density_grid import averaged_density, camera_positions
 from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.grid_sampler import GridSampler
 from charnerf.types import FieldOutput
 from support.analytic_scenes import box_hull, figure, scene_of, sphere, with_field
 

@@ -38,7 +38,7 @@ def test_axes_of_each_format(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply"])
-def test_srgb_colours_stay_as_they_are(tmp_path, suffix):
+def test_srgb_colors_stay_as_they_are(tmp_path, suffix):
     loaded = trimesh.load(save_mesh(_figure(), tmp_path / f"hero{suffix}"), force="mesh", process=False)
     assert (loaded.visual.vertex_colors == (40, 12, 200, 255)).all()
 
@@ -49,7 +49,7 @@ def _glb_parts(path):
     return json.loads(raw[20 : 20 + length]), raw[20 + length + 8 :], raw
 
 
-def test_glb_colours_are_linear_with_16_bits(tmp_path):
+def test_glb_colors_are_linear_with_16_bits(tmp_path):
     document, binary, raw = _glb_parts(save_mesh(_figure(), tmp_path / "hero.glb"))
     assert int.from_bytes(raw[8:12], "little") == len(raw)
     accessor = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]]
@@ -88,7 +88,7 @@ def test_bad_targets_are_named_and_leave_nothing(tmp_path):
 
 
 @pytest.mark.blender
-def test_blender_opens_it_upright_facing_front_in_its_colours(tmp_path):
+def test_blender_opens_it_upright_facing_front_in_its_colors(tmp_path):
     bpy = pytest.importorskip("bpy", reason="needs the bpy module (pip install bpy)")
     path = save_mesh(_figure(), tmp_path / "hero.glb")
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -97,5 +97,5 @@ def test_blender_opens_it_upright_facing_front_in_its_colours(tmp_path):
     matrix = np.array(hero.matrix_world)
     points = np.array([v.co[:] for v in hero.data.vertices]) @ matrix[:3, :3].T + matrix[:3, 3]
     np.testing.assert_allclose([points.min(0), points.max(0)], [(-0.3, -0.5, 0), (0.9, 0.2, 2)], atol=1e-5)
-    colours = np.array([c.color_srgb[:] for c in hero.data.color_attributes[0].data])
-    np.testing.assert_allclose(255 * colours[:, :3], np.tile([[40, 12, 200]], (len(colours), 1)), atol=1.0)
+    colors = np.array([c.color_srgb[:] for c in hero.data.color_attributes[0].data])
+    np.testing.assert_allclose(255 * colors[:, :3], np.tile([[40, 12, 200]], (len(colors), 1)), atol=1.0)

@@ -8,9 +8,10 @@ import trimesh
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing.build import build_mesh
-from charnerf.meshing.calibrate import LEVELS, choose_level
-from charnerf.meshing.density_grid import DensityGrid, GridSampler
+from charnerf.meshing.density_grid import DensityGrid
 from charnerf.meshing.extract import drop_floaters, extract_surface, fit_height, simplify
+from charnerf.meshing.grid_sampler import GridSampler
+from charnerf.meshing.level import LEVELS, choose_level
 from charnerf.meshing.options import MeshOptions
 from charnerf.types import LeftOut, SourceViews
 from support.analytic_scenes import capsule, figure, scene_of, sphere, with_field
@@ -69,11 +70,11 @@ def test_empty_field_says_its_range():
         extract_surface(grid, -1.0)
 
 
-def test_simplify_keeps_form_and_colours():
+def test_simplify_keeps_form_and_colors():
     mesh = _ball(1.0, 0.0).subdivide()
-    colours = np.full((len(mesh.vertices), 4), 255, np.uint8)
-    colours[mesh.vertices[:, 0] > 0, :3] = (10, 200, 30)
-    mesh.visual.vertex_colors = colours
+    colors = np.full((len(mesh.vertices), 4), 255, np.uint8)
+    colors[mesh.vertices[:, 0] > 0, :3] = (10, 200, 30)
+    mesh.visual.vertex_colors = colors
     small = simplify(mesh, 500)
     assert 490 <= len(small.faces) <= 500 and small.is_watertight and small.euler_number == 2
     assert small.volume == pytest.approx(mesh.volume, rel=0.01)
@@ -140,7 +141,7 @@ def test_level_of_a_slab_is_the_density_where_half_of_the_light_is_gone():
     assert 0.45 * half_gone < level < 1.1 * half_gone
 
 
-def test_built_mesh_is_coloured_and_of_the_asked_size():
+def test_built_mesh_is_colored_and_of_the_asked_size():
     built = build_mesh(scene_of(figure), _views_of(figure), MeshOptions(resolution=96, faces=4000))
     mesh = built.mesh
     assert 3900 <= len(mesh.faces) <= 4000 < built.num_extracted

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from charnerf.meshing.build import build_mesh
-from charnerf.meshing.density_grid import GridSampler
+from charnerf.meshing.grid_sampler import GridSampler
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import ABOVE, gain_at, raised_rays
 from charnerf.scene import Scene
@@ -75,8 +75,8 @@ def test_only_missed_rays_are_raised_to_just_above_the_level(drawings):
     torch.testing.assert_close(
         gain_at(raised, inside), torch.tensor((ABOVE * LEVEL / 6.0, 1.0, 1.0, 1.0)), atol=0.05, rtol=0
     )
-    gains, known, before = gain_at(raised, inside).numpy(), sampler.known.copy(), sampler.values.copy()
-    at = np.argwhere(known & (before > 0.0))
+    gains, settled, before = gain_at(raised, inside).numpy(), sampler.settled.copy(), sampler.values.copy()
+    at = np.argwhere(settled & (before > 0.0))
     unraised = hazy.field(inside, torch.zeros_like(inside)).densities.numpy()
     sampler.multiply(partial(gain_at, raised))
     np.testing.assert_allclose(sampler.density_at(inside.numpy()), unraised * gains, rtol=1e-5)

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from charnerf.errors import DataError
-from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.grid_sampler import GridSampler
 from charnerf.meshing.smooth import smooth_mesh
 from support.analytic_scenes import figure, scene_of, sphere
 

@@ -7,9 +7,10 @@ import pytest
 import torch
 
 from charnerf.geometry.hull import hull_contains
-from charnerf.meshing.density_grid import GridSampler, averaged_density
+from charnerf.meshing.density_grid import averaged_density
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.grid_sampler import GridSampler
 from charnerf.meshing.symmetry import symmetric_hull, symmetric_scene
 from charnerf.scene import Scene
 from support.analytic_scenes import box_hull, capsule, figure, scene_of, with_field
@@ -62,7 +63,7 @@ def test_a_symmetric_scene_stays_as_it_is():
     torch.testing.assert_close(after.densities, before.densities, rtol=1e-4, atol=1e-4)
 
 
-def test_colours_stay_on_their_side():
+def test_colors_stay_on_their_side():
     """A badge on one side is not doubled; a side that is empty takes the other's colour."""
     plain = _scene(figure)
 

@@ -64,7 +64,7 @@ def _grey_scene():
     return with_field(scene, field)
 
 
-def _colour_at(mesh: trimesh.Trimesh, directions) -> np.ndarray:
+def _color_at(mesh: trimesh.Trimesh, directions) -> np.ndarray:
     """Texture colours (n, 3) where rays from the ball's centre leave it, by the nearest vertices."""
     parts = welded(exported(mesh, ".ply", "x"))
     wanted = np.array((0.0, 0.0, 1.0)) + 0.8 * np.asarray(directions)
@@ -103,9 +103,9 @@ def test_texturing_moves_no_surface_and_no_normal():
     np.testing.assert_allclose(joined.normals[other], mesh.vertex_normals[order], atol=1e-6)
 
 
-def test_each_side_has_the_colour_that_was_drawn_and_the_field_the_rest():
+def test_each_side_has_the_color_that_was_drawn_and_the_field_the_rest():
     done = texture_mesh(_grey_scene(), _ball(), _views(_plain), size=256)
-    found = _colour_at(done.mesh, [(0, -1, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0)])
+    found = _color_at(done.mesh, [(0, -1, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0)])
     np.testing.assert_allclose(found[:3], (FRONT, SIDE, BACK), atol=0.02)
     np.testing.assert_allclose(found[3], 0.5, atol=0.06)  # the right side nobody drew
     assert 0.05 < done.num_from_field / done.num_texels < 0.5

@@ -32,31 +32,31 @@ def _box() -> trimesh.Trimesh:
     return trimesh.Trimesh(box.vertices, box.faces, process=False)
 
 
-def _side_colours(normals: np.ndarray) -> np.ndarray:
+def _side_colors(normals: np.ndarray) -> np.ndarray:
     """Colour by where a normal points (n, 3); sides by name, top and bottom grey."""
-    colours = np.tile(np.array(SIDES["right"], np.float64), (len(normals), 1))
+    colors = np.tile(np.array(SIDES["right"], np.float64), (len(normals), 1))
     for name, axis in (("front", (0, -1, 0)), ("left", (1, 0, 0)), ("back", (0, 1, 0))):
-        colours[normals @ np.array(axis) > 0.5] = SIDES[name]
-    return colours / 255.0
+        colors[normals @ np.array(axis) > 0.5] = SIDES[name]
+    return colors / 255.0
 
 
 def _textured() -> trimesh.Trimesh:
     mesh = _box()
     atlas = unwrap(mesh, 128)
     texels = rasterise(atlas, 128)
-    rgb = _side_colours(mesh.face_normals[texels.face])
+    rgb = _side_colors(mesh.face_normals[texels.face])
     return textured_copy(mesh, atlas, Image.fromarray(padded_picture(rgb, texels, 128)))
 
 
-def _coloured() -> trimesh.Trimesh:
+def _colored() -> trimesh.Trimesh:
     mesh = _box()
     rgba = np.full((len(mesh.vertices), 4), 255, np.uint8)
-    rgba[:, :3] = np.round(255 * _side_colours(mesh.vertex_normals))
+    rgba[:, :3] = np.round(255 * _side_colors(mesh.vertex_normals))
     mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=rgba)
     return mesh
 
 
-MESHES = {"textured": _textured, "coloured": _coloured, "plain": _box}
+MESHES = {"textured": _textured, "coloured": _colored, "plain": _box}
 
 
 @pytest.mark.parametrize("kind", MESHES)
@@ -87,9 +87,9 @@ def test_glb_and_obj_give_the_texture_back(tmp_path):
         np.testing.assert_allclose(uv, wanted, atol=1e-6)
 
 
-def test_ply_gets_the_textures_colours_at_the_corners(tmp_path):
+def test_ply_gets_the_textures_colors_at_the_corners(tmp_path):
     loaded = trimesh.load(save_mesh(_textured(), tmp_path / "hero.ply"), force="mesh", process=False)
-    wanted = 255 * _side_colours(loaded.vertex_normals)
+    wanted = 255 * _side_colors(loaded.vertex_normals)
     assert np.abs(loaded.visual.vertex_colors[:, :3] - wanted).max() <= 3
 
 
@@ -119,7 +119,7 @@ def test_without_the_library_usdz_says_what_to_install(tmp_path, monkeypatch):
 
 @pytest.mark.blender
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "obj", "usdz"])
-def test_blender_shows_each_side_in_its_colour(tmp_path, suffix):
+def test_blender_shows_each_side_in_its_color(tmp_path, suffix):
     """Imported 2 m tall, facing -Y; an unlit render has the sRGB colours that were written."""
     bpy = pytest.importorskip("bpy", reason="needs the bpy module (pip install bpy)")
     path = save_mesh(_textured(), tmp_path / f"hero.{suffix}")

@@ -37,7 +37,7 @@ def figure(kind: str) -> trimesh.Trimesh:
     return trimesh.util.concatenate(parts)
 
 
-def colours_at(points: np.ndarray) -> torch.Tensor:
+def colors_at(points: np.ndarray) -> torch.Tensor:
     """The colour of a point (K, 3) of every figure: smooth in space."""
     return torch.from_numpy(0.5 + 0.4 * np.sin(3.0 * points + np.array([0.0, 1.0, 2.0]))).float()
 
@@ -47,7 +47,7 @@ def photograph(mesh: trimesh.Trimesh, camera: Cameras, *, oversampling: int = 4)
     pixels = pixel_centres(camera.width * oversampling, camera.height * oversampling) / oversampling
     hits = RayCaster(mesh.triangles).pixel_hits(camera, pixels.reshape(-1, 2))
     fine = torch.zeros(camera.width * camera.height * oversampling**2, 4)
-    fine[hits.hit, :3], fine[hits.hit, 3] = colours_at(hits[hits.hit].points), 1.0
+    fine[hits.hit, :3], fine[hits.hit, 3] = colors_at(hits[hits.hit].points), 1.0
     mean = fine.reshape(camera.height, oversampling, camera.width, oversampling, 4).mean(dim=(1, 3))
     mean[..., :3] /= mean[..., 3:].clamp_min(1e-6)
     return (mean * 255.0).round().to(torch.uint8)

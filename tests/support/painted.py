@@ -12,14 +12,14 @@ def _at(x: float, z: float) -> tuple[float, float]:
     return (x + MIDDLE) * SCALE, (MIDDLE + 1.0 - z) * SCALE
 
 
-def _box(draw, x0, z0, x1, z1, colour):
+def _box(draw, x0, z0, x1, z1, color):
     (left, bottom), (right, top) = _at(x0, z0), _at(x1, z1)
-    draw.rectangle((left, top, right, bottom), fill=colour)
+    draw.rectangle((left, top, right, bottom), fill=color)
 
 
-def _disc(draw, x, z, radius, colour):
+def _disc(draw, x, z, radius, color):
     (left, bottom), (right, top) = _at(x - radius, z - radius), _at(x + radius, z + radius)
-    draw.ellipse((left, top, right, bottom), fill=colour)
+    draw.ellipse((left, top, right, bottom), fill=color)
 
 
 def paint(view: str) -> Image.Image:
@@ -45,9 +45,9 @@ def paint(view: str) -> Image.Image:
     return picture
 
 
-def on_background(picture: Image.Image, colour=(255, 255, 255)) -> Image.Image:
+def on_background(picture: Image.Image, color=(255, 255, 255)) -> Image.Image:
     """Without alpha, on a plain colour."""
-    plain = Image.new("RGBA", picture.size, (*colour, 255))
+    plain = Image.new("RGBA", picture.size, (*color, 255))
     plain.alpha_composite(picture)
     return plain.convert("RGB")
 

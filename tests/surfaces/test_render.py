@@ -28,7 +28,7 @@ def _cameras(*azimuths: float):
     )
 
 
-def test_colours_are_those_of_the_vertices_and_outlines_exact():
+def test_colors_are_those_of_the_vertices_and_outlines_exact():
     (picture,) = render_mesh(_box(), _cameras(0.0))
     np.testing.assert_allclose(picture[16, 16], (40 / 255, 120 / 255, 200 / 255, 1.0), atol=1e-3)
     assert picture[..., 3].sum() == 8 * 16  # 1 m x 2 m at 8 pixels a metre

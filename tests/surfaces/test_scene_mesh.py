@@ -25,7 +25,7 @@ def test_texture_rows_run_down_and_factors_multiply_light():
 @pytest.mark.parametrize(
     "encoding, light", [("srgb", ((128 / 255 + 0.055) / 1.055) ** 2.4), (None, 128 / 255)]
 )
-def test_vertex_and_face_colours_mean_what_their_file_means(encoding, light):
+def test_vertex_and_face_colors_mean_what_their_file_means(encoding, light):
     for kind in ("vertex_colors", "face_colors"):
         mesh = trimesh.creation.box()
         if encoding:

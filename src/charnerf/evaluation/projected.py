@@ -61,10 +61,10 @@ class ProjectedMesh:
         normals = self._normals[hits.triangles]
         away = (normals * hits.directions).sum(-1, keepdims=True) > 0.0
         normals = np.where(away, -normals, normals)  # of the side that is seen
-        colours = self._colours(torch.from_numpy(hits.points), torch.from_numpy(normals), towards)
+        colors = self._colors(torch.from_numpy(hits.points), torch.from_numpy(normals), towards)
         fine = torch.zeros(len(pixels), 5)
         fine[torch.from_numpy(rays.hit)] = torch.cat(
-            (colours, torch.ones(len(colours), 1), torch.from_numpy(hits.distances)[:, None]), dim=1
+            (colors, torch.ones(len(colors), 1), torch.from_numpy(hits.distances)[:, None]), dim=1
         )
         mean = fine.reshape(height, many, width, many, 5).mean(dim=(1, 3))
         opacity = mean[..., 3]
@@ -72,16 +72,16 @@ class ProjectedMesh:
         depth = torch.where(seen, mean[..., 4] / torch.where(seen, opacity, 1.0), FAR)
         return RenderOutput(rgb=mean[..., :3] + (1.0 - opacity)[..., None], opacity=opacity, depth=depth)
 
-    def _colours(self, points: Tensor, normals: Tensor, towards: Tensor) -> Tensor:
+    def _colors(self, points: Tensor, normals: Tensor, towards: Tensor) -> Tensor:
         """Colours (K, 3) of surface points (K, 3) with normals (K, 3), for a camera in a direction (3,)."""
         choice = self._choose_views(points, normals, towards)
-        colours = torch.zeros(len(points), 3)
+        colors = torch.zeros(len(points), 3)
         for view, camera_maps in enumerate(self._premultiplied):
             chosen = choice == view
             pixels, _, _ = project(self._cameras[view], points[chosen])
             value = look_up(camera_maps, pixels)
-            colours[chosen] = (value[:, :3] / value[:, 3:].clamp_min(1e-3)).clamp(0.0, 1.0)
-        return colours
+            colors[chosen] = (value[:, :3] / value[:, 3:].clamp_min(1e-3)).clamp(0.0, 1.0)
+        return colors
 
     def _choose_views(self, points: Tensor, normals: Tensor, towards: Tensor) -> Tensor:
         """Which source view colours each point, (K,): the nearest to the camera of those that see it.

@@ -9,10 +9,10 @@ from functools import partial
 
 import trimesh
 
-from charnerf.meshing.calibrate import LevelChoice, choose_level
-from charnerf.meshing.colour import colour_vertices
-from charnerf.meshing.density_grid import GridSampler
 from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
+from charnerf.meshing.field_colors import color_vertices
+from charnerf.meshing.grid_sampler import GridSampler
+from charnerf.meshing.level import LevelChoice, choose_level
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import gain_at, raised_rays
 from charnerf.meshing.smooth import smooth_mesh
@@ -135,7 +135,7 @@ def finish_mesh(
     extraction, textured = found.extraction, None
     surface = extraction.mesh if options.faces is None else simplify(extraction.mesh, options.faces)
     if options.texture == "vertex":
-        surface = mesh = colour_vertices(scene, surface)
+        surface = mesh = color_vertices(scene, surface)
     else:
         used = drawings if options.texture == "drawings" else None
         textured = texture_mesh(scene, surface, used, size=options.texture_size)

@@ -14,10 +14,11 @@ from torch import Tensor
 
 from charnerf.geometry.safe import safe_normalize
 from charnerf.markdown import table
-from charnerf.meshing.calibrate import choose_level
-from charnerf.meshing.density_grid import GridSampler, camera_positions
+from charnerf.meshing.density_grid import camera_positions
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.extract import extract_surface
+from charnerf.meshing.grid_sampler import GridSampler
+from charnerf.meshing.level import choose_level
 from charnerf.scene import AbstractField, DensityOutput, Scene
 from charnerf.types import FieldOutput, SourceViews, TensorRecord
 

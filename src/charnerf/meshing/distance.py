@@ -24,5 +24,5 @@ def _to_surface(mesh: trimesh.Trimesh, target: trimesh.Trimesh) -> np.ndarray:
     owner = np.concatenate((face, np.arange(len(centres))))
     near = owner[tree.query(points, k=NEAR)[1]]
     spread = np.repeat(points, NEAR, axis=0)
-    found = closest_point(np.asarray(target.triangles)[near.reshape(-1)], spread)
-    return np.linalg.norm(found - spread, axis=1).reshape(-1, NEAR).min(1)
+    nearest = closest_point(np.asarray(target.triangles)[near.reshape(-1)], spread)
+    return np.linalg.norm(nearest - spread, axis=1).reshape(-1, NEAR).min(1)

@@ -10,7 +10,7 @@ import trimesh
 from PIL import Image
 
 from charnerf.meshing.axes import vertices_for
-from charnerf.meshing.extract import vertex_colours
+from charnerf.meshing.extract import vertex_colors
 from charnerf.pictures import read_bilinear
 
 
@@ -52,7 +52,7 @@ def exported(mesh: trimesh.Trimesh, suffix: str, name: str) -> ExportedMesh:
         suffix: Of the format, such as ".glb".
         name: Of the mesh.
     """
-    rgba, picture = vertex_colours(mesh), texture_picture(mesh)
+    rgba, picture = vertex_colors(mesh), texture_picture(mesh)
     return ExportedMesh(
         name=name,
         vertices=vertices_for(suffix, mesh.vertices),
@@ -70,8 +70,8 @@ def texture_picture(mesh: trimesh.Trimesh) -> Image.Image | None:
     if not isinstance(visual, trimesh.visual.TextureVisuals) or visual.uv is None:
         return None
     material = visual.material
-    found = getattr(material, "baseColorTexture", None)
-    return found if found is not None else getattr(material, "image", None)
+    picture = getattr(material, "baseColorTexture", None)
+    return picture if picture is not None else getattr(material, "image", None)
 
 
 def welded(mesh: ExportedMesh) -> ExportedMesh:

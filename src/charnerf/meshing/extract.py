@@ -149,7 +149,7 @@ def _joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.concatenate([part.vertices for part in parts]), faces, process=False)
 
 
-def vertex_colours(mesh: trimesh.Trimesh) -> np.ndarray | None:
+def vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray | None:
     """RGBA uint8 (P, 4) of a mesh whose vertices are coloured, else None."""
     visual = mesh.visual
     if isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "vertex":
@@ -176,10 +176,10 @@ def simplify(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
         np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), target_count=faces, agg=5
     )[:2]
     result = trimesh.Trimesh(*make_manifold(points, triangles), process=False)
-    colours = vertex_colours(mesh)
-    if colours is not None:
+    colors = vertex_colors(mesh)
+    if colors is not None:
         nearest = cKDTree(mesh.vertices).query(result.vertices)[1]
-        result.visual = trimesh.visual.ColorVisuals(result, vertex_colors=colours[nearest])
+        result.visual = trimesh.visual.ColorVisuals(result, vertex_colors=colors[nearest])
     return result
 
 

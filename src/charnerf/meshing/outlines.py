@@ -59,7 +59,7 @@ def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityG
     Returns:
         One entry a drawing.
     """
-    found = []
+    raised = []
     for v in (views.present[0] & ~views.mirrored[0]).nonzero()[:, 0].tolist():
         camera, alpha = views.cameras[0, v : v + 1], views.images[0, v, 3]
         mask = alpha > MASK_ALPHA
@@ -70,8 +70,8 @@ def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityG
         # a gain of its own for every pixel would leave stairs: the largest around, smoothed
         logs = torch.where(gains > MOST, 1.0, gains).log()[None, None]
         logs = F.avg_pool2d(F.max_pool2d(logs, 3, stride=1, padding=1), 3, stride=1, padding=1)
-        found.append(RaisedRays(camera, logs[0, 0].exp(), missed, int(mask.sum())))
-    return found
+        raised.append(RaisedRays(camera, logs[0, 0].exp(), missed, int(mask.sum())))
+    return raised
 
 
 def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sure: float) -> Tensor:
@@ -83,12 +83,12 @@ def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sur
         return near
     num = max(2, int(float((far - near).max()) / STEP))
     share = (torch.arange(num, dtype=near.dtype, device=near.device) + 0.5) / num
-    known = coarse.between(near.device)
+    coarse_density = coarse.interpolator(near.device)
     peaks = torch.full_like(near, torch.inf)
     for part in torch.arange(len(near), device=near.device).split(RAYS_AT_ONCE):
         t = near[part, None] + (far - near).clamp_min(0.0)[part, None] * share
         points = points_along(rays[part], t)
-        unsure = (known(points).amax(-1) < sure).nonzero()[:, 0]
+        unsure = (coarse_density(points).amax(-1) < sure).nonzero()[:, 0]
         dirs = rays.directions[part[unsure], None].expand(-1, num, -1)
         densities = densities_inside(scene, points[unsure].reshape(-1, 3), dirs.reshape(-1, 3))
         peaks[part[unsure]] = densities.view(-1, num).amax(-1)

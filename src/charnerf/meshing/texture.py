@@ -15,7 +15,7 @@ from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from charnerf.meshing.atlas import Atlas, Texels, rasterise, unwrap
-from charnerf.meshing.colour import field_colours
+from charnerf.meshing.field_colors import field_colors
 from charnerf.meshing.projection import Projector
 from charnerf.scene import Scene
 from charnerf.types import SourceViews
@@ -33,7 +33,7 @@ class Textured:
         mesh: The same surface, its vertices split at seams, normals those of the surface before.
         size: S.
         num_texels: K.
-        num_from_field: Texels for which the field was asked; the others were left out.
+        num_from_field: Texels that the field was evaluated for; the others were left out.
     """
 
     mesh: trimesh.Trimesh
@@ -60,11 +60,11 @@ def texture_mesh(scene: Scene, mesh: trimesh.Trimesh, drawings: SourceViews | No
     points, normals = _spread(mesh.vertices, mesh, texels), _spread(mesh.vertex_normals, mesh, texels)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     if drawings is None:
-        rgb, asked = field_colours(scene, points, normals), len(points)
+        rgb, num_from_field = field_colors(scene, points, normals), len(points)
     else:
-        rgb, asked = _drawn_colours(scene, mesh, drawings, points, normals, texels)
+        rgb, num_from_field = _drawn_colors(scene, mesh, drawings, points, normals, texels)
     picture = Image.fromarray(padded_picture(rgb, texels, size))
-    return Textured(textured_copy(mesh, atlas, picture), size, len(points), asked)
+    return Textured(textured_copy(mesh, atlas, picture), size, len(points), num_from_field)
 
 
 def _spread(values: np.ndarray, mesh: trimesh.Trimesh, texels: Texels) -> np.ndarray:
@@ -74,7 +74,7 @@ def _spread(values: np.ndarray, mesh: trimesh.Trimesh, texels: Texels) -> np.nda
     return sum(texels.weights[:, k, None] * values[corners[:, k]] for k in range(3))
 
 
-def _drawn_colours(
+def _drawn_colors(
     scene: Scene,
     mesh: trimesh.Trimesh,
     views: SourceViews,
@@ -82,17 +82,17 @@ def _drawn_colours(
     normals: np.ndarray,
     texels: Texels,
 ) -> tuple[np.ndarray, int]:
-    """Colours (K, 3) by the drawings, by the field where these do not decide, and how often it was asked."""
+    """Colours (K, 3) by the drawings, by the field where these do not decide, and how often that was."""
     projector = Projector(views, mesh)
     drawn = projector.at(points, normals, texels.face)
-    asked = np.flatnonzero(drawn.trust < ENOUGH)
+    unsure = np.flatnonzero(drawn.trust < ENOUGH)
     rgb = drawn.rgb
-    if len(asked):
+    if len(unsure):
         offsets = _spread(_matching_offsets(scene, mesh, projector), mesh, texels)
-        guessed = field_colours(scene, points[asked], normals[asked]) + offsets[asked]
-        share = (drawn.trust[asked] / ENOUGH)[:, None]
-        rgb[asked] = share * rgb[asked] + (1.0 - share) * guessed.clip(0.0, 1.0)
-    return rgb, len(asked)
+        guessed = field_colors(scene, points[unsure], normals[unsure]) + offsets[unsure]
+        share = (drawn.trust[unsure] / ENOUGH)[:, None]
+        rgb[unsure] = share * rgb[unsure] + (1.0 - share) * guessed.clip(0.0, 1.0)
+    return rgb, len(unsure)
 
 
 def _matching_offsets(scene: Scene, mesh: trimesh.Trimesh, projector: Projector) -> np.ndarray:
@@ -105,16 +105,16 @@ def _matching_offsets(scene: Scene, mesh: trimesh.Trimesh, projector: Projector)
     some_face = np.zeros(len(vertices), np.int64)
     some_face[np.asarray(mesh.faces)] = np.arange(len(mesh.faces))[:, None]
     drawn = projector.at(vertices, normals, some_face)
-    known = drawn.trust >= ENOUGH
+    decided = drawn.trust >= ENOUGH
     offsets = np.zeros((len(vertices), 3))
-    if not known.any() or known.all():
+    if not decided.any() or decided.all():
         return offsets
-    offsets[known] = drawn.smooth[known] - field_colours(scene, vertices[known], normals[known])
-    return _faded(mesh, offsets, known)
+    offsets[decided] = drawn.smooth[decided] - field_colors(scene, vertices[decided], normals[decided])
+    return _faded(mesh, offsets, decided)
 
 
-def _faded(mesh: trimesh.Trimesh, values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Values (P, 3) continued from known vertices to the others, fading over FADE."""
+def _faded(mesh: trimesh.Trimesh, values: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """Values (P, 3) continued from fixed vertices to the others, fading over FADE."""
     edges = np.asarray(mesh.edges_unique)
     lengths = np.asarray(mesh.edges_unique_length)
     weights = 1.0 / np.maximum(lengths, 0.05 * lengths.mean())
@@ -126,9 +126,9 @@ def _faded(mesh: trimesh.Trimesh, values: np.ndarray, known: np.ndarray) -> np.n
     spread = np.zeros(count)
     np.add.at(spread, ends[:, 0], np.concatenate((lengths, lengths)) / 2.0)
     system = diags_array(degree + spread / FADE**2) - links
-    free = np.flatnonzero(~known)
+    free = np.flatnonzero(~fixed)
     matrix = system.tocsr()[free]
-    right = -matrix[:, np.flatnonzero(known)] @ values[known]
+    right = -matrix[:, np.flatnonzero(fixed)] @ values[fixed]
     result = values.copy()
     result[free] = spsolve(matrix[:, free].tocsc(), right).reshape(-1, 3)
     return result
@@ -136,13 +136,13 @@ def _faded(mesh: trimesh.Trimesh, values: np.ndarray, known: np.ndarray) -> np.n
 
 def padded_picture(rgb: np.ndarray, texels: Texels, size: int) -> np.ndarray:
     """Texture (S, S, 3) uint8 of colours (K, 3): texels between the charts take the nearest chart's colour."""
-    picture, known = np.zeros((size * size, 3), np.uint8), np.zeros(size * size, bool)
+    picture, filled = np.zeros((size * size, 3), np.uint8), np.zeros(size * size, bool)
     picture[texels.index] = np.round(255.0 * rgb.clip(0.0, 1.0))
-    known[texels.index] = True
-    if not known.any():
+    filled[texels.index] = True
+    if not filled.any():
         return picture.reshape(size, size, 3)
     nearest = ndimage.distance_transform_edt(
-        ~known.reshape(size, size), return_distances=False, return_indices=True
+        ~filled.reshape(size, size), return_distances=False, return_indices=True
     )
     return picture.reshape(size, size, 3)[tuple(nearest)]
 

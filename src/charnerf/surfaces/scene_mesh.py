@@ -42,15 +42,15 @@ def placed_meshes(
     """Every triangle mesh of a scene, its vertices (n, 3) in the scene's frame, and its faces (M, 3)."""
     if isinstance(scene, trimesh.Trimesh):
         return [(scene, np.asarray(scene.vertices, dtype=np.float64), np.asarray(scene.faces))]
-    found = []
+    placed = []
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         mesh = scene.geometry[name]
         if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
             continue
         vertices = np.asarray(mesh.vertices, dtype=np.float64) @ transform[:3, :3].T + transform[:3, 3]
-        found.append((mesh, vertices, np.asarray(mesh.faces)))
-    return found
+        placed.append((mesh, vertices, np.asarray(mesh.faces)))
+    return placed
 
 
 def surface_of_scene(scene: trimesh.Scene | trimesh.Trimesh) -> SurfaceMesh:

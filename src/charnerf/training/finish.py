@@ -17,7 +17,7 @@ from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
-from charnerf.meshing.extract import vertex_colours
+from charnerf.meshing.extract import vertex_colors
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
@@ -96,12 +96,12 @@ def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, train
     (folder / "meshes").mkdir(exist_ok=True)
     save_mesh(built.mesh, folder / "meshes" / f"{name}.glb")
     contact_sheet(built.mesh, sources).save(folder / "meshes" / f"{name}_sheet.png")
-    colours = vertex_colours(built.mesh)
-    if isinstance(trainer.logger, TensorBoardLogger) and colours is not None:
+    colors = vertex_colors(built.mesh)
+    if isinstance(trainer.logger, TensorBoardLogger) and colors is not None:
         trainer.logger.experiment.add_mesh(
             f"mesh/{name}",
             vertices=torch.from_numpy(np.asarray(built.mesh.vertices, dtype=np.float32)[None]),
-            colors=torch.from_numpy(colours[None, :, :3].copy()),
+            colors=torch.from_numpy(colors[None, :, :3].copy()),
             faces=torch.from_numpy(np.asarray(built.mesh.faces, dtype=np.int64)[None]),
             global_step=trainer.global_step,
         )

@@ -12,7 +12,7 @@ from charnerf.scene import Scene
 
 
 @torch.no_grad()
-def field_colours(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def field_colors(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """The field's colours of surface points, each seen straight on, along minus its normal.
 
     Args:
@@ -30,8 +30,8 @@ def field_colours(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.n
     where = torch.tensor(np.asarray(points), dtype=torch.float32, device=device)
     outward = torch.tensor(np.asarray(normals), dtype=torch.float32, device=device)
     parts = zip(where.split(CHUNK), outward.split(CHUNK), strict=True)
-    colours = [scene.field(here, -normal).rgb for here, normal in parts]
-    rgb = torch.cat([where.new_zeros(0, 3), *colours]).double().cpu().numpy()
+    colors = [scene.field(here, -normal).rgb for here, normal in parts]
+    rgb = torch.cat([where.new_zeros(0, 3), *colors]).double().cpu().numpy()
     if not np.isfinite(rgb).all():
         raise NumericalError(
             f"colours: found {int((~np.isfinite(rgb)).sum())} of {rgb.size} values not finite, "
@@ -41,7 +41,7 @@ def field_colours(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.n
     return rgb.clip(0.0, 1.0)
 
 
-def colour_vertices(scene: Scene, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+def color_vertices(scene: Scene, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Colour the vertices of a mesh by the field, looking at each along minus its normal.
 
     Args:
@@ -56,7 +56,7 @@ def colour_vertices(scene: Scene, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
         NumericalError: If the field answers NaN or infinity.
     """
     rgba = np.full((len(mesh.vertices), 4), 255, np.uint8)
-    rgba[:, :3] = np.round(255.0 * field_colours(scene, mesh.vertices, mesh.vertex_normals))
-    coloured = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    coloured.visual = trimesh.visual.ColorVisuals(coloured, vertex_colors=rgba)
-    return coloured
+    rgba[:, :3] = np.round(255.0 * field_colors(scene, mesh.vertices, mesh.vertex_normals))
+    colored = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    colored.visual = trimesh.visual.ColorVisuals(colored, vertex_colors=rgba)
+    return colored

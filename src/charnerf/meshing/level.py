@@ -141,7 +141,7 @@ def _march(grid: DensityGrid, camera: Cameras, stride: int = 1) -> _March:
     pixels = pixel_centres(camera.width, camera.height)[stride // 2 :: stride, stride // 2 :: stride]
     rays = pixel_rays(camera, pixels.reshape(-1, 2).to(camera.focal.dtype))
     rays = RayBundle(rays.origins.float(), rays.directions.float())
-    between = grid.between()
+    density_at = grid.interpolator()
     corner = torch.from_numpy(grid.origin).float()
     extent = (torch.tensor(grid.densities.shape) - 1) * grid.spacing
     near, far = box_interval(rays, corner, corner + extent)
@@ -153,7 +153,7 @@ def _march(grid: DensityGrid, camera: Cameras, stride: int = 1) -> _March:
     for part in (far > near).nonzero()[:, 0].split(4096):
         length = far[part] - near[part]
         points = points_along(rays[part], near[part, None] + length[:, None] * middle)
-        densities = between(points)
+        densities = density_at(points)
         depth = (densities.cumsum(-1) * (length / num)[:, None]).contiguous()
         half_gone = torch.searchsorted(depth, torch.full((len(part), 1), HALF_GONE))
         median[part] = _depth_at(half_gone + 0.5, near, far, part, num)[:, 0]
