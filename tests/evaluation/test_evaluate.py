@@ -37,7 +37,6 @@ def outcome(figure_dataset, tmp_path_factory):
         output=output,
         mesh=make_mesh,
         train_seconds=12.5,
-        progress=False,
     )
     return found, output
 
@@ -125,7 +124,6 @@ def test_a_mesh_that_fails_is_a_reason_and_no_end(figure_dataset):
         views=1,
         mesh=fail,
         baselines=False,
-        progress=False,
     )
     assert found["chamfer_mm_reason"] == "density: found 3 values not finite."
 
@@ -138,7 +136,7 @@ def test_a_prediction_of_nan_names_its_picture(figure_dataset):
             return SimpleNamespace(finest=output, left_out=LeftOut())
 
     with pytest.raises(NumericalError, match=r"ball, view \d: rgb"):
-        evaluate(BlindModel(), Broken(), figure_dataset, "test", views=1, progress=False)
+        evaluate(BlindModel(), Broken(), figure_dataset, "test", views=1)
 
 
 def test_a_data_set_without_meshes_says_so(tmp_path):
@@ -152,7 +150,6 @@ def test_a_data_set_without_meshes_says_so(tmp_path):
         views=1,
         mesh=make_mesh,
         baselines=False,
-        progress=False,
     )
     assert found["f_score_reason"] == "the data set has no mesh of the character"
 

@@ -5,7 +5,7 @@ import shutil
 import pytest
 import torch
 
-from charnerf import commands
+from charnerf.cli.evaluate import split_of
 from charnerf.data.characters import load_character
 from charnerf.evaluation import metrics
 from charnerf.evaluation.baselines import VisualHullBaseline
@@ -81,7 +81,7 @@ def test_evaluation_fills_every_metric_and_says_why_where_it_can_not(training, f
 
     def measure(known):
         model, renderer = HullModel(), WhiteRenderer()
-        options = {"views": 2, "progress": False, "training": known}
+        options = {"views": 2, "training": known}
         return evaluate(model, renderer, figure_dataset, "test", **options)["baselines"]["nearest"]
 
     found = measure(TrainingCharacters([(training, "test")]))
@@ -104,7 +104,7 @@ def test_a_sheet_shows_it(training, figure_dataset, tmp_path):
     known = TrainingCharacters([(training, "test")])
     arguments = (HullModel(), HullRenderer(), figure_dataset, "test")
     for name, nearest in (("with", known), ("without", None)):
-        evaluate(*arguments, views=1, output=tmp_path / name, training=nearest, progress=False)
+        evaluate(*arguments, views=1, output=tmp_path / name, training=nearest)
     sizes = [(tmp_path / name / "images/doll/sheet.png").stat().st_size for name in ("with", "without")]
     assert sizes[0] > sizes[1]
     rows = (tmp_path / "with/views.csv").read_text().splitlines()
@@ -113,6 +113,6 @@ def test_a_sheet_shows_it(training, figure_dataset, tmp_path):
 
 def test_data_sets_and_splits_are_named_in_one_word(tmp_path):
     (tmp_path / "a:b").mkdir()
-    assert commands.split_of(f"{tmp_path}/x:extra") == (tmp_path / "x", "extra")
-    assert commands.split_of(f"{tmp_path}/x") == (tmp_path / "x", "train")
-    assert commands.split_of(f"{tmp_path}/a:b") == (tmp_path / "a:b", "train")
+    assert split_of(f"{tmp_path}/x:extra") == (tmp_path / "x", "extra")
+    assert split_of(f"{tmp_path}/x") == (tmp_path / "x", "train")
+    assert split_of(f"{tmp_path}/a:b") == (tmp_path / "a:b", "train")

@@ -30,7 +30,6 @@ def evaluated(figure_dataset: Path, tmp_path_factory: pytest.TempPathFactory) ->
         views=2,
         output=folder,
         train_seconds=21.0,
-        progress=False,
     )
     write_metrics(folder / "metrics.json", found)
     return folder

@@ -8,7 +8,9 @@ import pytest
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from charnerf.cli import run as charnerf
 from charnerf.errors import ConfigError, DataError
+from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.inference.build import build_model
 from charnerf.inference.weights import load, load_config
 from charnerf.training.clock import RunClock
@@ -61,6 +63,20 @@ def test_the_run_folder_is_complete(run_folder):
     assert load_config(run_folder).loss.depth.weight == 0.1
     model = load(run_folder)
     assert not model.network.training
+
+
+def test_evaluating_the_run_gives_its_own_figures(run_folder, figure_dataset, tmp_path):
+    """Typed without options: as many views, meshes as fine, and the renderer are the run's."""
+    file = tmp_path / "metrics.json"
+    command = ["evaluate", str(run_folder), "--data", str(figure_dataset), "--json", str(file)]
+    assert charnerf([*command, "--nearest-from", str(figure_dataset), "--device", "cpu"]) == 0
+    own, again = (json.loads(path.read_text()) for path in (run_folder / "metrics.json", file))
+    assert again["num_views"] == own["num_views"] == 1
+    measured = [key for key in METRIC_KEYS if own[key] is not None]  # LPIPS needs weights
+    assert {*METRIC_KEYS} - {*measured} <= {"lpips"}
+    assert [again[key] for key in measured] == pytest.approx([own[key] for key in measured], rel=1e-5)
+    assert again["baselines"]["nearest"]["found"] == own["baselines"]["nearest"]["found"]
+    assert again["seconds"]["train"] == own["seconds"]["train"]
 
 
 def test_the_curve_has_a_row_a_validation(run_folder):

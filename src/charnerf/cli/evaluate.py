@@ -9,7 +9,7 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Dataset, Device, Resolution, Trusted, Weights
+from charnerf.cli.options import Dataset, Device, Trusted, Weights
 from charnerf.errors import ConfigError
 from charnerf.meshing.options import MeshOptions
 
@@ -35,6 +35,12 @@ Renderer = Annotated[
     typer.Option(help="Another renderer than the model was trained with."),
 ]
 Mesh = Annotated[bool, typer.Option(help="Make every mesh, for Chamfer and F-score.")]
+Resolution = Annotated[
+    int | None,
+    typer.Option(
+        max=1024, help="Grid points along a mesh's longest side; as many as in the run if left out."
+    ),
+]
 Baselines = Annotated[
     bool, typer.Option(help="Measure white, the visual hull and the nearest beside the model.")
 ]
@@ -59,7 +65,7 @@ def command(
     output: Kept = None,
     renderer: Renderer = None,
     mesh: Mesh = True,
-    resolution: Resolution = MeshOptions.resolution,
+    resolution: Resolution = None,
     baselines: Baselines = True,
     nearest_from: NearestFrom = None,
     device: Device = "auto",
@@ -71,7 +77,8 @@ def command(
     """
     if views not in (None, "all") and not (views.isdigit() and int(views) >= 1):
         raise ConfigError(f"--views: found '{views}', expected a number from 1 on, or all.")
-    options = MeshOptions(resolution=resolution, height=None)
+    if resolution is not None:
+        MeshOptions(resolution=resolution)
     from charnerf.evaluation.evaluate import evaluate
     from charnerf.evaluation.metrics_file import write_metrics
     from charnerf.evaluation.nearest import TrainingCharacters
@@ -81,36 +88,40 @@ def command(
 
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
+    run_views, run_resolution = _measured_by(run)
+    options = MeshOptions(resolution=resolution or run_resolution, height=None)
     metrics = evaluate(
         model.network,
         model.renderer,
         data,
         split,
-        views=_views_of(run) if views is None else "all" if views == "all" else int(views),
+        views=run_views if views is None else "all" if views == "all" else int(views),
         output=output,
         mesh=partial(build_mesh, options=options) if mesh else None,
         baselines=baselines,
-        training=TrainingCharacters([_split_of(one) for one in nearest_from]) if nearest_from else None,
+        training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=_train_seconds(run),
     )
     if output is not None:
         write_metrics(output / "metrics.json", metrics)
         say(f"report: {write_run_report(output)}")
     if json_file is not None:
-        json_file.parent.mkdir(parents=True, exist_ok=True)
         write_metrics(json_file, metrics)
     typer.echo(json.dumps(metrics, indent=2))
 
 
-def _views_of(run: Path | None) -> int | Literal["all"]:
-    """Fixed views a character that a run measured at its end."""
+def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:
+    """Fixed views a character and grid points of its mesh that a run measured at its end."""
     from omegaconf import OmegaConf
 
     from charnerf.inference.weights import load_config
 
     if run is None:
-        return FIXED_VIEWS
-    return OmegaConf.select(load_config(run), "scale.eval_views", default=FIXED_VIEWS) or "all"
+        return FIXED_VIEWS, MeshOptions.resolution
+    cfg = load_config(run)
+    views: int | None = OmegaConf.select(cfg, "scale.eval_views", default=FIXED_VIEWS)
+    resolution: int = OmegaConf.select(cfg, "scale.mesh_resolution", default=MeshOptions.resolution)
+    return "all" if views is None else views, resolution
 
 
 def _train_seconds(run: Path | None) -> float | None:
@@ -123,7 +134,7 @@ def _train_seconds(run: Path | None) -> float | None:
         return None
 
 
-def _split_of(text: str) -> tuple[Path, str]:
+def split_of(text: str) -> tuple[Path, str]:
     """Folder and split of DATASET[:SPLIT]."""
     folder, _, split = text.rpartition(":")
     return (Path(text), "train") if not folder or Path(text).is_dir() else (Path(folder), split)

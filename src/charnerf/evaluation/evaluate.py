@@ -31,9 +31,8 @@ def evaluate(
     baselines: bool = True,
     training: TrainingCharacters | None = None,
     train_seconds: float | None = None,
-    progress: bool = True,
 ) -> dict[str, Any]:
-    """Measure a model on a split; returns the content of metrics.json.
+    """Measure a model on a split; draws a bar with the time left, returns the content of metrics.json.
 
     Args:
         network: In eval mode.
@@ -47,7 +46,6 @@ def evaluate(
         baselines: As `measure_character` takes it.
         training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
-        progress: Whether to draw a progress bar with the time left.
 
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
@@ -58,7 +56,7 @@ def evaluate(
     )
     names = names_of(read_dataset(root), split)
     results = []
-    with tqdm(total=0, desc=f"evaluate {split}", unit="view", disable=not progress) as bar:
+    with tqdm(total=0, desc=f"evaluate {split}", unit="view") as bar:
         for place, name in enumerate(names):
             character = load_character(root, name)
             frames = fixed_views(character, views)
