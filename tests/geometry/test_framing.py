@@ -8,9 +8,6 @@ import torch
 from charnerf.config.composition import compose_config
 from charnerf.geometry.cameras import angles_from_direction, project
 from charnerf.geometry.framing import (
-    BOX_HALF_EXTENT,
-    CENTRE,
-    HEIGHT,
     MARGIN,
     SOURCE_AZIMUTHS,
     framing_camera,
@@ -18,6 +15,7 @@ from charnerf.geometry.framing import (
     framing_radius,
     source_cameras,
 )
+from charnerf.geometry.world import BOX_HALF_EXTENT, CENTRE, HEIGHT
 
 
 def test_a_standing_character_fills_all_but_the_margin():

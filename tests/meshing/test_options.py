@@ -8,7 +8,6 @@ from dataclasses import fields
 import pytest
 
 from charnerf.errors import ConfigError
-from charnerf.geometry.framing import HEIGHT
 from charnerf.inference.hero import Hero
 from charnerf.meshing.options import MeshOptions
 
@@ -36,10 +35,6 @@ def test_the_library_has_the_same_options_and_defaults():
     assert [(one.name, one.default) for one in keywords] == [
         (one.name, one.default) for one in fields(MeshOptions)
     ]
-
-
-def test_a_mesh_is_as_tall_as_characters_are():
-    assert MeshOptions().height == HEIGHT
 
 
 def test_defaults_are_read_without_importing_anything_heavy():

@@ -16,7 +16,8 @@ from charnerf.geometry.cameras import (
     pixel_centres,
     pixel_rays,
 )
-from charnerf.geometry.framing import CENTRE, framing_cameras
+from charnerf.geometry.framing import framing_cameras
+from charnerf.geometry.world import CENTRE
 from charnerf.types import Cameras, RayBundle, SourceViews
 
 HALF_EXTENT = 1.15

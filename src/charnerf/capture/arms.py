@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from charnerf.capture.outline import CELL_WIDTH, ROW_HEIGHT, middle_runs
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 LOWERED = (np.radians(10.0), np.radians(80.0))  # how far arms are turned down

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from charnerf.errors import ConfigError, DataError
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")

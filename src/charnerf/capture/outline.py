@@ -3,7 +3,7 @@
 import numpy as np
 
 from charnerf.errors import DataError
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh, interpolate, triangle_areas
 
 ROWS, COLUMNS = 80, 80

@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from charnerf.capture.arms import find_arms
 from charnerf.capture.outline import CELL_WIDTH, ROW_HEIGHT, middle_runs
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 _SOFT = 0.04 * HEIGHT  # m over which a turn sets in

@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from charnerf.capture.lights import AbstractLight
 from charnerf.geometry.cameras import project
-from charnerf.geometry.framing import CENTRE
+from charnerf.geometry.world import CENTRE
 from charnerf.surfaces.color import srgb_from_linear
 from charnerf.surfaces.raycast import Hits, RayCaster
 from charnerf.surfaces.surface_mesh import SurfaceMesh, shade, texture_levels, triangle_normals

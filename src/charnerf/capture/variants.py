@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from charnerf.capture.arms import lower_arms
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 SEPARATOR = "+"  # NAME+2 is the second variant of NAME

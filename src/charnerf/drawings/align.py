@@ -10,7 +10,8 @@ import numpy as np
 from PIL import Image
 
 from charnerf.errors import DataError
-from charnerf.geometry.framing import HEIGHT, framing_radius
+from charnerf.geometry.framing import framing_radius
+from charnerf.geometry.world import HEIGHT
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 
 PANEL = 320  # pixels a side
 CAPTION = 40

@@ -15,7 +15,8 @@ from charnerf.drawings.picture import draw_assumptions
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
-from charnerf.geometry.framing import HEIGHT, framing_cameras
+from charnerf.geometry.framing import framing_cameras
+from charnerf.geometry.world import HEIGHT
 from charnerf.reconciling import Reconciliation, reconcile
 from charnerf.types import SourceViews
 

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from charnerf.evaluation.projected import FAR, ProjectedMesh, look_up
 from charnerf.geometry.cameras import project
-from charnerf.geometry.framing import BOX_HALF_EXTENT, CENTRE
+from charnerf.geometry.world import BOX_HALF_EXTENT, CENTRE
 from charnerf.types import Cameras, RenderOutput, SourceViews
 
 _COARSE_CELL = 0.06

@@ -20,7 +20,7 @@ from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.baselines import used_drawings
 from charnerf.evaluation.projected import ProjectedMesh, look_up
 from charnerf.geometry.cameras import project
-from charnerf.geometry.framing import BOX_HALF_EXTENT, CENTRE
+from charnerf.geometry.world import BOX_HALF_EXTENT, CENTRE
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.types import Cameras, RenderOutput, SourceViews
 

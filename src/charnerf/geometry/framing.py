@@ -1,4 +1,4 @@
-"""How a character stands in the world, and how pictures frame it: one rule for captures, drawings and renderings.
+"""How pictures frame a character: one rule for captures, drawings and renderings.
 
 A model knows pictures that are framed so; drawings or cameras by another rule would be reconstructed wrong, without an error.
 """
@@ -9,15 +9,13 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
+from charnerf.geometry.world import CENTRE, HEIGHT
 from charnerf.types import Cameras
 
-HEIGHT = 2.0  # metres, from the floor at z = 0 to the crown
-CENTRE = (0.0, 0.0, 0.5 * HEIGHT)  # which cameras look at
 SOURCE_AZIMUTHS = {"front": 0.0, "side": 90.0, "back": 180.0}  # degrees; the drawings, in their order
 SOURCE_ORDER = tuple(SOURCE_AZIMUTHS)
 MARGIN = 1.05  # of what a picture frames over the character's farthest point
 LEAST_DISTANCE = 4.0  # metres, of a camera from the centre
-BOX_HALF_EXTENT = 1.8  # metres; half the side of a cube around the centre that holds every character
 
 
 def framing_radius(reach: float) -> float:

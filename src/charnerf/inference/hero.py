@@ -12,7 +12,8 @@ import torch
 
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.errors import ConfigError
-from charnerf.geometry.framing import CENTRE, framing_camera, framing_radius
+from charnerf.geometry.framing import framing_camera, framing_radius
+from charnerf.geometry.world import CENTRE
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.lod import Lod, build_lods
 from charnerf.meshing.options import MeshOptions, Texture

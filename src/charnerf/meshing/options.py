@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, final, get_args
 
 from charnerf.errors import ConfigError
+from charnerf.geometry.world import HEIGHT
 
 Texture = Literal["vertex", "drawings", "field"]
 
@@ -34,7 +35,7 @@ class MeshOptions:
     num_cameras: int = 8
     faces: int | None = None
     smooth: int = 0
-    height: float | None = 2.0  # of every character: geometry/framing.py
+    height: float | None = HEIGHT
     texture: Texture = "vertex"
     texture_size: int = 1024
 

@@ -7,7 +7,7 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from charnerf.geometry.framing import HEIGHT
+from charnerf.geometry.world import HEIGHT
 from charnerf.procedural.shapes import Shape
 
 Texels = NDArray[np.uint8]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from charnerf.geometry.framing import CENTRE, framing_radius
+from charnerf.geometry.framing import framing_radius
+from charnerf.geometry.world import CENTRE
 from charnerf.surfaces.color import linear_from_bytes
 
 CUTOFF = 0.5
