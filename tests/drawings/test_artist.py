@@ -8,6 +8,7 @@ from charnerf.config.options import option
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawings
+from charnerf.drawings.redrawn import redrawn
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import ConfigError
@@ -63,3 +64,15 @@ def test_views_differ_more_from_level_to_level(character):
     assert apart[0] <= apart[1] < apart[3] and apart[2] < apart[3]
     with pytest.raises(ConfigError, match="level: found 4, expected 0 to 3"):
         draw_character(character, size=64, seed=1, level=4)
+
+
+def test_a_redrawn_character_keeps_its_truth(character):
+    """Other source views of the model's size, the same targets; level 0 is the character itself."""
+    assert redrawn(character, level=0, seed=0, size=64) is character
+    again = redrawn(character, level=2, seed=0, size=64)
+    assert again.sources.images.shape == (1, 3, 4, 64, 64)
+    assert again.image_files == character.image_files and again.mesh_file == character.mesh_file
+    front, back = again.sources.images[0, 0, 3], again.sources.images[0, 2, 3]
+    assert torch.equal(back, front.flip(-1)), "reconciled: the back takes the mirrored front's outline"
+    loose = redrawn(character, level=2, seed=0, size=64, reconciled=False).sources.images[0]
+    assert not torch.equal(loose[2, 3], loose[0, 3].flip(-1))

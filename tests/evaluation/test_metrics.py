@@ -137,3 +137,16 @@ def test_points_that_are_none_or_not_finite_are_refused():
         metrics.surface_distances(np.full((4, 3), np.nan), points)
     with pytest.raises(ShapeError, match="true"):
         metrics.surface_distances(points, np.zeros((0, 3)))
+
+
+def test_haze_of_a_figure_and_of_fog():
+    """A crisp disc has none; inside it, so many pixels of fog are so large a share."""
+    y, x = np.mgrid[:64, :64] - 31.5
+    radius = np.hypot(x, y)
+    crisp = torch.from_numpy(np.clip(20.5 - radius, 0.0, 1.0))
+    assert metrics.haze(crisp) == 0.0
+    foggy = crisp.clone()
+    foggy[30:34, 30:34] = 0.7
+    assert metrics.haze(foggy) == pytest.approx(16 / int((crisp > 0.05).sum()))
+    assert metrics.haze(torch.full((64, 64), 0.3)) == 1.0, "fog alone has no outline"
+    assert metrics.haze(torch.zeros(64, 64)) is None

@@ -1,17 +1,22 @@
 """`charnerf evaluate`: a model measured on a split."""
 
 import json
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from charnerf.cli.drawings import AsDrawn
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Dataset, Device, Trusted, Weights
 from charnerf.errors import ConfigError
 from charnerf.meshing.options import MeshOptions
+
+if TYPE_CHECKING:
+    from charnerf.data.characters import Character
 
 FIXED_VIEWS = 24  # a character, by weights that lie in no run's folder
 NumViews = Annotated[
@@ -44,6 +49,14 @@ Resolution = Annotated[
 Baselines = Annotated[
     bool, typer.Option(help="Measure white, the visual hull and the nearest beside the model.")
 ]
+Drawn = Annotated[
+    str | None,
+    typer.Option(
+        "--drawn",
+        metavar="LEVEL[:SEED]",
+        help="Draw the source views anew, disagreeing: 1 a careful hand, 2 limbs off by 10 degrees, 3 by 30 degrees.",
+    ),
+]
 NearestFrom = Annotated[
     list[str] | None,
     typer.Option(
@@ -68,6 +81,8 @@ def command(
     resolution: Resolution = None,
     baselines: Baselines = True,
     nearest_from: NearestFrom = None,
+    drawn: Drawn = None,
+    as_drawn: AsDrawn = False,
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -101,6 +116,7 @@ def command(
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=_train_seconds(run),
+        redrawn=None if drawn is None else _redrawn(drawn, model.image_size, reconciled=not as_drawn),
     )
     if output is not None:
         write_metrics(output / "metrics.json", metrics)
@@ -108,6 +124,16 @@ def command(
     if json_file is not None:
         write_metrics(json_file, metrics)
     typer.echo(json.dumps(metrics, indent=2))
+
+
+def _redrawn(text: str, size: int, *, reconciled: bool) -> "Callable[[Character], Character]":
+    """What draws the source views of LEVEL[:SEED]."""
+    from charnerf.drawings.redrawn import redrawn
+
+    level, _, seed = text.partition(":")
+    if not level.isdigit() or not (seed.isdigit() or not seed):
+        raise ConfigError(f"--drawn: found '{text}', expected LEVEL or LEVEL:SEED, such as 2 or 2:7.")
+    return partial(redrawn, level=int(level), seed=int(seed or 0), size=size, reconciled=reconciled)
 
 
 def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:

@@ -1,5 +1,6 @@
 """A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Any, Literal
 
 from tqdm import tqdm
 
-from charnerf.data.characters import load_character
+from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.character import MakeMesh, measure_character
 from charnerf.evaluation.frames import fixed_views
@@ -31,6 +32,7 @@ def evaluate(
     baselines: bool = True,
     training: TrainingCharacters | None = None,
     train_seconds: float | None = None,
+    redrawn: Callable[[Character], Character] | None = None,
 ) -> dict[str, Any]:
     """Measure a model on a split; draws a bar with the time left, returns the content of metrics.json.
 
@@ -46,6 +48,7 @@ def evaluate(
         baselines: As `measure_character` takes it.
         training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
+        redrawn: Gives a character other source views, such as `drawings.redrawn` does; None keeps those captured.
 
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
@@ -59,6 +62,8 @@ def evaluate(
     with tqdm(total=0, desc=f"evaluate {split}", unit="view") as bar:
         for place, name in enumerate(names):
             character = load_character(root, name)
+            if redrawn is not None:
+                character = redrawn(character)
             frames = fixed_views(character, views)
             bar.total = bar.n + len(frames) * (len(names) - place)  # the others are taken to have as many
             result = measure(character, frames, on_picture=bar.update)

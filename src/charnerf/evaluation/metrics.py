@@ -7,6 +7,7 @@ that means nothing.
 
 import numpy as np
 import torch
+from scipy import ndimage
 from scipy.spatial import cKDTree
 from torch import Tensor
 from torchmetrics.functional.image import structural_similarity_index_measure
@@ -18,6 +19,10 @@ FOREGROUND_ALPHA = 0.5
 """True alpha above which a pixel counts as the character."""
 F_SCORE_RADIUS_M = 0.02
 """Distance within which a surface point counts as found."""
+HAZE = (0.05, 0.95)
+"""Opacities between which a pixel is neither clear nor opaque."""
+HAZE_MARGIN = 2.0
+"""Pixels beside an outline that may be either."""
 MIN_SQUARED_ERROR = 1e-10
 """Mean squared errors below this count as this: equal pictures have 100 dB, so that means stay finite."""
 
@@ -167,3 +172,21 @@ def f_score(there: np.ndarray, back: np.ndarray, *, radius: float = F_SCORE_RADI
     precision, recall = float((there <= radius).mean()), float((back <= radius).mean())
     total = precision + recall
     return 2.0 * precision * recall / total if total else 0.0
+
+
+def haze(opacity: Tensor) -> float | None:
+    """Share of a figure's pixels that are neither clear nor opaque, away from its outline; None where it shows nothing.
+
+    Args:
+        opacity: (H, W), in [0, 1]. The figure is where it is above HAZE[0]; hazy pixels are below HAZE[1] and farther than
+            HAZE_MARGIN pixels from where it passes one half.
+    """
+    values = opacity.detach().cpu().numpy()
+    figure = values > HAZE[0]
+    if not figure.any():
+        return None
+    half = values > 0.5
+    inner = ndimage.binary_erosion(half, border_value=1)
+    outline = (half & ~inner) | (ndimage.binary_dilation(half) & ~half)
+    away = ndimage.distance_transform_edt(~outline) > HAZE_MARGIN if outline.any() else np.ones_like(half)
+    return float((figure & (values < HAZE[1]) & away).sum() / figure.sum())

@@ -15,7 +15,7 @@ from charnerf.evaluation.surface_error import SURFACE_KEYS
 from charnerf.pictures import on_white
 from charnerf.types import RenderOutput
 
-VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou")
+VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou", "haze")
 METRIC_KEYS = VIEW_KEYS + SURFACE_KEYS
 
 
@@ -56,7 +56,11 @@ def score_views(
 ) -> tuple[list[dict[str, float | None]], dict[str, str]]:
     """VIEW_KEYS of predictions against the true bytes (n, H, W, 4), and why a key is missing."""
     scores = [_score_view(*pair, lpips) for pair in zip(predictions, images, strict=True)]
-    reasons = {"lpips": lpips.reason, "psnr_foreground": "no pixel has a true alpha above 0.5"}
+    reasons = {
+        "lpips": lpips.reason,
+        "psnr_foreground": "no pixel has a true alpha above 0.5",
+        "haze": "the picture is empty",
+    }
     missing = {key for each in scores for key, value in each.items() if value is None}
     return scores, {key: str(reason) for key, reason in reasons.items() if key in missing}
 
@@ -71,6 +75,7 @@ def _score_view(prediction: RenderOutput, image: Tensor, lpips: Lpips) -> dict[s
         "lpips": lpips(prediction.rgb, truth),
         "flip": metrics.flip(prediction.rgb, truth),
         "silhouette_iou": metrics.silhouette_iou(prediction.opacity, alpha),
+        "haze": metrics.haze(prediction.opacity),
     }
 
 
