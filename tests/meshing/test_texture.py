@@ -14,7 +14,7 @@ from charnerf.meshing.atlas import rasterise, unwrap
 from charnerf.meshing.exported import exported, read_texture, texture_picture, welded
 from charnerf.meshing.extract import fit_height
 from charnerf.meshing.projection import Projector
-from charnerf.meshing.texture import padded_picture, texture_mesh
+from charnerf.meshing.texture import _faded, padded_picture, texture_mesh
 from charnerf.types import SourceViews
 from support.analytic_scenes import scene_of, sphere, with_field
 
@@ -176,6 +176,20 @@ def test_the_field_paints_everything_when_asked():
     wanted = scene.field(torch.from_numpy(place), torch.zeros(len(place), 3)).rgb.numpy()
     found = read_texture(texture_picture(done.mesh), np.asarray(done.mesh.visual.uv))
     assert np.median(np.abs(found - wanted)) < 0.01
+
+
+def test_a_part_of_no_size_leaves_the_other_colours_alone():
+    """Decimation can leave a loose triangle whose corners lie in one place: nothing ties it to anything."""
+    ball = trimesh.creation.icosphere(2, 0.5)
+    speck = trimesh.Trimesh(np.full((3, 3), 2.0), [[0, 1, 2]], process=False)
+    both = trimesh.util.concatenate([ball, speck])
+    known = np.arange(len(both.vertices)) < 40
+    values = np.where(known[:, None], 0.25, 0.0) * np.ones(3)
+    alone = _faded(ball, values[:-3], known[:-3])
+    with_speck = _faded(both, values, known)
+    assert np.isfinite(with_speck).all()
+    np.testing.assert_allclose(with_speck[:-3], alone, atol=1e-3)
+    assert 0.0 < alone[~known[:-3]].max() <= 0.25
 
 
 def test_padding_leaves_no_texel_blank():

@@ -117,7 +117,8 @@ def _faded(mesh: trimesh.Trimesh, values: np.ndarray, fixed: np.ndarray) -> np.n
     """Values (P, 3) continued from fixed vertices to the others, fading over FADE."""
     edges = np.asarray(mesh.edges_unique)
     lengths = np.asarray(mesh.edges_unique_length)
-    weights = 1.0 / np.maximum(lengths, 0.05 * lengths.mean())
+    shortest = 0.05 * lengths.mean()
+    weights = 1.0 / np.maximum(lengths, shortest)
     ends = np.concatenate((edges, edges[:, ::-1]))
     count = len(mesh.vertices)
     links = coo_array((np.concatenate((weights, weights)), (ends[:, 0], ends[:, 1])), (count, count)).tocsr()
@@ -125,6 +126,7 @@ def _faded(mesh: trimesh.Trimesh, values: np.ndarray, fixed: np.ndarray) -> np.n
     # in one dimension: value'' = value / FADE^2, each edge standing for a piece as long as itself
     spread = np.zeros(count)
     np.add.at(spread, ends[:, 0], np.concatenate((lengths, lengths)) / 2.0)
+    spread = np.maximum(spread, shortest)  # a loose part of no size would make the system singular
     system = diags_array(degree + spread / FADE**2) - links
     free = np.flatnonzero(~fixed)
     matrix = system.tocsr()[free]
