@@ -1,6 +1,7 @@
 """What an installed package carries."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -66,8 +67,14 @@ def test_the_command_is_declared() -> None:
 
 
 def test_ci_runs_what_the_readme_says() -> None:
-    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    """The README's test command and the linters; the workflow runs the same."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    test = re.search(r"^ {4}(python -m pip install .* && python -m pytest)$", readme, re.MULTILINE)
+    assert test is not None
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8").replace(" --quiet", "")
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
     assert "set -euo pipefail" in script
-    for step in ("ruff check", "ruff format --check", "mypy", "python -m pytest"):
-        assert step in script
+    for step in (*test[1].split(" && "), "ruff check .", "ruff format --check .", "mypy"):
+        assert f"\n{step}\n" in script
+        assert step in workflow
     assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
