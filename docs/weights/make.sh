@@ -69,6 +69,3 @@ python train.py data=folder "data.root=$data" \
 
 charnerf evaluate "$run" --data "$data" --split test -o "$folder/measured" \
   --nearest-from "$data:train" --nearest-from "$data:train_extra" --nearest-from "$data:embedded"
-[ -e "$folder/README.md" ] ||
-  printf '# New weights\n\n%s\n\n%s\n' '<!-- figures: written by `charnerf card` -->' '<!-- end of figures -->' > "$folder/README.md"
-charnerf card "$folder/README.md" --curve "$run/curve.csv" --measured "Real characters, test=$folder/measured"

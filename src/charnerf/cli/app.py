@@ -12,7 +12,6 @@ import typer
 from charnerf.cli import (
     bench,
     capture,
-    card,
     check,
     draw,
     evaluate,
@@ -53,7 +52,6 @@ for module in (
     check,
 ):
     app.command(module.__name__.rpartition(".")[2], epilog=DEBUG_NOTE)(module.command)
-app.command("card", epilog=DEBUG_NOTE)(card.card)
 
 
 @app.callback()

@@ -1,0 +1,1 @@
+"""The pages, and what writes their figures: `python -m docs`. Not part of the installed package."""
