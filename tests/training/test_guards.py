@@ -40,7 +40,7 @@ def test_the_white_alarm_fires_once_after_its_patience(figure_dataset, tmp_path,
 
     def steps(count: int, opacity: float) -> int:
         for _ in range(count):
-            run.module.last_opacity = opacity
+            run.module.logged = {"train/opacity_foreground": opacity}
             alarm.on_train_batch_end(run.trainer, run.module)
         return caplog.text.count("collapsed to white")
 

@@ -4,9 +4,11 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import torch
+from torch.utils.tensorboard import SummaryWriter
 
 from charnerf.training.monitor import BudgetBar, _nearness
 from charnerf.types import RenderOutput
+from support import small_runs
 
 
 def test_depth_is_drawn_of_what_is_seen():
@@ -26,3 +28,24 @@ def test_the_time_left_of_a_resumed_run_is_not_negative():
     bar.on_train_batch_end(SimpleNamespace(callback_metrics={}), cast(Any, None))
     assert bar.bar.n == clock.seconds > bar.bar.initial
     bar.on_train_end(cast(Any, None), cast(Any, None))
+
+
+def test_the_picture_that_is_shown_is_the_one_that_was_measured(figure_dataset, tmp_path, monkeypatch):
+    """A validation renders each of its views once, drawn or not."""
+    cfg = small_runs.smoke_config(
+        figure_dataset, "encoder=single", "validation.times=1", "validation.views=2"
+    )
+    run = small_runs.assemble(cfg, tmp_path)
+    rendered, shown = [], []
+    render = run.module.eval_renderer.render_camera
+
+    def render_camera(*arguments):
+        rendered.append(render(*arguments))
+        return rendered[-1]
+
+    monkeypatch.setattr(run.module, "eval_renderer", SimpleNamespace(render_camera=render_camera))
+    monkeypatch.setattr(SummaryWriter, "add_image", lambda _, tag, image, step: shown.append((tag, image)))
+    run.fit()
+    assert len(rendered) == 2 * len(run.data.val_store)
+    first = dict(shown)["val/truth_prediction_depth_opacity/0"][:, :, 32:64]
+    torch.testing.assert_close(first, rendered[0].finest.rgb.clamp(0, 1).permute(2, 0, 1))

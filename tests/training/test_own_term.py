@@ -27,7 +27,7 @@ class Thin(AbstractTerm):
 '''
 
 
-def test_a_term_from_outside_is_trained_and_logged(figure_dataset, tmp_path, monkeypatch):
+def test_a_term_from_outside_is_trained_logged_and_weighed_by_phases(figure_dataset, tmp_path, monkeypatch):
     (tmp_path / "thin_lab.py").write_text(TERM)
     monkeypatch.syspath_prepend(str(tmp_path))
     mine = (
@@ -35,9 +35,15 @@ def test_a_term_from_outside_is_trained_and_logged(figure_dataset, tmp_path, mon
         "+loss.thin={_target_:thin_lab.Thin,weight:0.5}",
         "validation.times=2",
     )
-    run = small_runs.assemble(small_runs.smoke_config(figure_dataset, *mine), tmp_path / "run").fit()
+    phases = (
+        "schedule=two_phase",
+        "schedule.phases.0.until.share=0.5",
+        "+schedule.phases.1.loss_weights={thin:0}",
+    )
+    run = small_runs.assemble(small_runs.smoke_config(figure_dataset, *mine, *phases), tmp_path / "run").fit()
     assert "train/loss/thin" in run.trainer.callback_metrics
     with (tmp_path / "run/curve.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0])[-2:] == ["occupancy", "thin"]
     assert float(rows[0]["thin"]) > 0.0
+    assert rows[1]["thin"] == ""  # of the second phase

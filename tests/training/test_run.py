@@ -14,7 +14,7 @@ from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.inference.build import build_model
 from charnerf.inference.weights import load, load_config
 from charnerf.training.clock import RunClock
-from charnerf.training.module import rate_at
+from charnerf.training.optimization import rate_at
 from charnerf.training.run import begin, find_checkpoint, run_training, training_renderer
 from support import small_runs
 

@@ -60,7 +60,7 @@ class WhiteAlarm(L.Callback):
     def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
         """Count steps without any opacity on the character."""
         assert isinstance(pl_module, TrainingModule)
-        opacity = pl_module.last_opacity
+        opacity = float(pl_module.logged["train/opacity_foreground"])
         if math.isnan(opacity):
             return
         self.empty_steps = self.empty_steps + 1 if opacity < COLLAPSED_OPACITY else 0

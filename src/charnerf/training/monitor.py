@@ -97,7 +97,9 @@ class CurveWriter(L.Callback):
         """Add a row."""
         if trainer.sanity_checking or trainer.global_rank != 0:
             return
-        metrics = trainer.callback_metrics
+        assert isinstance(pl_module, TrainingModule)
+        metrics = {name: value for name, value in trainer.callback_metrics.items() if name.startswith("val/")}
+        metrics |= pl_module.logged  # of the last step alone: the trainer keeps values that a phase has ended
 
         def read(name: str) -> float | str:
             return float(metrics[name]) if name in metrics else ""
@@ -129,30 +131,30 @@ class CurveWriter(L.Callback):
 class PictureLogger(L.Callback):
     """Logs image grids at validation: the drawings, then truth, prediction, depth and opacity of some characters."""
 
-    def on_validation_batch_end(
+    def on_validation_batch_end(  # type: ignore[override]
         self,
         trainer: L.Trainer,
         pl_module: L.LightningModule,
-        outputs: Any,
+        outputs: dict[str, RenderOutput],
         batch: ValidationView,
         batch_idx: int,
         dataloader_idx: int = 0,
     ) -> None:
-        """Draw the first view of each of the first characters."""
-        data = trainer.datamodule.val_views  # type: ignore[attr-defined]
+        """Draw the first view of each of the first characters, as it was measured."""
+        number, view = divmod(batch_idx, trainer.datamodule.val_views)  # type: ignore[attr-defined]
         board = pl_module.logger
-        if trainer.sanity_checking or batch_idx % data or batch_idx // data >= PICTURES:
+        if (
+            trainer.sanity_checking
+            or view > 0
+            or number >= PICTURES
+            or not isinstance(board, TensorBoardLogger)
+        ):
             return
-        if not isinstance(board, TensorBoardLogger) or not isinstance(pl_module, TrainingModule):
-            return
-        with torch.no_grad():
-            scene = pl_module.model.scene(pl_module.model.encode(batch.views, batch.hull), 0)
-            output = pl_module.eval_renderer.render_camera(scene, batch.camera).finest
-        opacity = output.opacity[..., None].expand_as(output.rgb)
-        grey = _nearness(output)[..., None].expand_as(output.rgb)
-        pictures = [on_white(batch.rgba), output.rgb, grey, opacity]
+        rendered = outputs["rendered"]
+        opacity = rendered.opacity[..., None].expand_as(rendered.rgb)
+        grey = _nearness(rendered)[..., None].expand_as(rendered.rgb)
+        pictures = [on_white(batch.rgba), rendered.rgb, grey, opacity]
         drawings = [on_white(image.permute(1, 2, 0)) for image in batch.views.images[0]]
-        number = batch_idx // data
         step = trainer.global_step
         board.experiment.add_image(f"val/inputs/{number}", _row(drawings), step)
         board.experiment.add_image(f"val/truth_prediction_depth_opacity/{number}", _row(pictures), step)
