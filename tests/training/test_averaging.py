@@ -22,8 +22,9 @@ class WeightsOfSteps(small_runs.L.Callback):
     def on_train_batch_end(self, trainer, pl_module, *_):
         self.trained.append(small_runs.weights(pl_module.model).clone())
 
-    def on_validation_epoch_start(self, trainer, pl_module):
-        self.validated.append(small_runs.weights(pl_module.model).clone())
+    def on_validation_batch_start(self, trainer, pl_module, batch, batch_idx):
+        if batch_idx == 0:
+            self.validated.append(small_runs.weights(pl_module.model).clone())
 
 
 def watched(cfg, folder, **options):
@@ -69,7 +70,7 @@ def test_a_resumed_run_has_the_same_average(figure_dataset, tmp_path):
     assert resumed.recorder.losses == straight.recorder.losses[4:]
     assert torch.equal(small_runs.weights(resumed.module.model), small_runs.weights(straight.module.model))
     average = next(one for one in resumed.trainer.callbacks if isinstance(one, WeightAverage))
-    assert average.updates == 6
+    assert average._average_model.n_averaged == 1 + 6  # the start, then every step
 
 
 def test_a_run_without_an_average_goes_on_with_one_from_its_weights(figure_dataset, tmp_path):
