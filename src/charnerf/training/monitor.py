@@ -98,8 +98,13 @@ class CurveWriter(L.Callback):
         if trainer.sanity_checking or trainer.global_rank != 0:
             return
         assert isinstance(pl_module, TrainingModule)
-        metrics = {name: value for name, value in trainer.callback_metrics.items() if name.startswith("val/")}
-        metrics |= pl_module.logged  # of the last step alone: the trainer keeps values that a phase has ended
+        measured = {
+            name: value for name, value in trainer.callback_metrics.items() if name.startswith("val/")
+        }
+        metrics = {
+            **measured,
+            **pl_module.logged,
+        }  # of the last step alone: the trainer's hold values that a phase has ended
 
         def read(name: str) -> float | str:
             return float(metrics[name]) if name in metrics else ""
