@@ -102,9 +102,7 @@ def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):
 
 
 def test_what_was_not_made_is_null_with_its_reason(figure_dataset):
-    found = evaluate(
-        BlindModel(), WhiteRenderer(), figure_dataset, "test", views=1, baselines=False, progress=False
-    )
+    found = evaluate(BlindModel(), WhiteRenderer(), figure_dataset, "test", views=1, baselines=False)
     assert found["baselines"] == {}
     assert found["chamfer_mm_reason"] == found["seconds"]["mesh_reason"] == "no mesh was made"
     assert found["seconds"]["train"] is None and found["seconds"]["train_reason"]
