@@ -2,14 +2,14 @@
 
 from charnerf.reporting.families import TABLE_TWO
 from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, seconds_text
-from charnerf.reporting.run_files import read_curve, read_metrics
+from charnerf.reporting.run_files import read_curve
 from docs.figures.sources import ROOT, markdown, read
 
 
 def scores(file: str) -> str:
     """The model's metrics and those of the baselines that were measured, of a metrics.json."""
-    metrics = read_metrics(ROOT / file)
-    columns = [key for key in COLUMNS if metrics[key] is not None]
+    metrics = read(file)
+    columns = [key for key in COLUMNS if metrics.get(key) is not None]
     methods = {"charnerf": metrics} | {
         title: metrics["baselines"][name] for name, title in BASELINE_NAMES.items()
     }
@@ -23,14 +23,14 @@ def scores(file: str) -> str:
 
 def measured(file: str) -> str:
     """On what it was measured."""
-    metrics = read_metrics(ROOT / file)
+    metrics = read(file)
     views = metrics["num_views"] // metrics["num_characters"]
     return f"{metrics['num_characters']} characters of the {metrics['split']} split, {views} views each"
 
 
 def seconds(file: str) -> str:
     """How long an evaluation's stages take, and where."""
-    metrics = read_metrics(ROOT / file)
+    metrics = read(file)
     took, machine = metrics["seconds"], metrics["environment"]
     return (
         f"{seconds_text(took['encode'])} to encode a character, {seconds_text(took['render_per_frame'])} a frame, "
@@ -40,7 +40,7 @@ def seconds(file: str) -> str:
 
 def azimuths(file: str) -> str:
     """PSNR and foreground PSNR by azimuth, the model's and the visual hull's."""
-    metrics = read_metrics(ROOT / file)
+    metrics = read(file)
     hull = metrics["baselines"]["visual_hull"]
     shown = [k for k, row in enumerate(metrics["by_azimuth"]) if row["psnr"] is not None]
     rows = [

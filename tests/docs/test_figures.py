@@ -76,7 +76,7 @@ def test_every_option_says_what_it_is() -> None:
 
 def test_tables_of_an_evaluation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(ROOT / "docs/weights/metrics_real_characters.json", tmp_path / "metrics.json")
-    monkeypatch.setattr(scores, "ROOT", tmp_path)
+    monkeypatch.setattr(sources, "ROOT", tmp_path)
     text = scores.scores("metrics.json")
     assert "LPIPS" not in text and "white picture" in text  # nothing measured it
     assert text.count("\n") == 5
