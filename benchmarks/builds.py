@@ -77,8 +77,8 @@ def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
         f"{CULLED} {fewer['num_coarse']} + {fewer['num_fine']}": CulledRenderer(**fewer),
         f"{ADAPTIVE} {LARGE_TOLERANCE}": AdaptiveRenderer(**like, tolerance=LARGE_TOLERANCE),
     }
-    found = measure(one, renderers, repeats=repeats)
-    base = found[BASELINE].seconds
+    measured = measure(one, renderers, repeats=repeats)
+    base = measured[BASELINE].seconds
     return {
         "parameters": parameters_of(network),
         "encoder": "ResNet-34" if has_resnet else "hourglass",
@@ -91,6 +91,6 @@ def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
                 "rms error": one.rms_error,
                 "max error": one.max_error,
             }
-            for name, one in found.items()
+            for name, one in measured.items()
         },
     }

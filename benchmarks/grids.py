@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import trimesh
@@ -37,10 +36,6 @@ class GridShare:
     distance: float
     seconds: float
     all_seconds: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers for JSON."""
-        return dict(vars(self))
 
 
 def grid_share(subject: Subject, *, cells: int, num_cameras: int) -> GridShare:

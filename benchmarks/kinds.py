@@ -26,7 +26,7 @@ SKIN, SHIRT, TROUSERS, STEEL, CLOTH = (
 WHITE = (255, 255, 255)
 
 
-def _coloured(mesh: trimesh.Trimesh, color: Color) -> trimesh.Trimesh:
+def _colored(mesh: trimesh.Trimesh, color: Color) -> trimesh.Trimesh:
     colors = np.tile(np.array([*color, 255], np.uint8), (len(mesh.vertices), 1))
     mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=colors)
     return mesh
@@ -35,11 +35,11 @@ def _coloured(mesh: trimesh.Trimesh, color: Color) -> trimesh.Trimesh:
 def _limb(
     start: tuple[float, float, float], end: tuple[float, float, float], radius: float, color: Color
 ) -> trimesh.Trimesh:
-    return _coloured(trimesh.creation.cylinder(radius, segment=(start, end), sections=16), color)
+    return _colored(trimesh.creation.cylinder(radius, segment=(start, end), sections=16), color)
 
 
 def _ball(centre: tuple[float, float, float], radius: float, color: Color) -> trimesh.Trimesh:
-    return _coloured(trimesh.creation.icosphere(3, radius).apply_translation(centre), color)
+    return _colored(trimesh.creation.icosphere(3, radius).apply_translation(centre), color)
 
 
 def _plate(
@@ -47,7 +47,7 @@ def _plate(
 ) -> trimesh.Trimesh:
     plate = trimesh.creation.box(size)
     plate.apply_transform(trimesh.transformations.rotation_matrix(turn, (0, 0, 1)))
-    return _coloured(plate.apply_translation(centre), color)
+    return _colored(plate.apply_translation(centre), color)
 
 
 def _body(skin: Color = SKIN, shirt: Color = SHIRT, trousers: Color = TROUSERS) -> list[trimesh.Trimesh]:
@@ -106,14 +106,14 @@ KINDS: dict[str, Callable[[], trimesh.Scene]] = {
 def subjects_by_kind(network: CharNeRF, *, size: int) -> list[Subject]:
     """One subject of each kind of scene; fog is what an untrained field of the same build answers."""
     fog = untrained_like(network)
-    found = []
+    subjects = []
     for kind, build in KINDS.items():
         pictured = captured(kind, build(), size)
         if kind == "empty picture":
             pictured = _looking_away(pictured)
         used = fog if kind == "fog" else network
-        found.append(subject(pictured, used))
-    return found
+        subjects.append(subject(pictured, used))
+    return subjects
 
 
 def _looking_away(pictured: Pictured) -> Pictured:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import torch
 
@@ -26,10 +26,6 @@ class PeakMemory:
 
     rise_mib: float
     seconds: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers for JSON."""
-        return dict(vars(self))
 
 
 def peak_memory(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
@@ -24,7 +23,7 @@ from benchmarks.scaling import growths
 from benchmarks.setting import Setting
 from benchmarks.steps import step_at_scale
 from benchmarks.threads import thread_rows
-from benchmarks.tricks import trick_methods
+from benchmarks.tricks import tricks
 from benchmarks.turntable import turntable
 from benchmarks.untrained import network_of, resized_network
 from charnerf.bench.headline import compare, headline
@@ -32,6 +31,7 @@ from charnerf.bench.plots import plot_work_precision
 from charnerf.bench.rendering import measure
 from charnerf.bench.subjects import NUM_PIXELS, subject
 from charnerf.bench.sweep import Method, sample_methods, sweep
+from charnerf.bench.timing import in_turns
 from charnerf.bench.workbench import ADAPTIVE, CULLED, DENSE, Workbench, settings_of
 from charnerf.geometry.resizing import resized_views
 from charnerf.inference.build import build_renderer
@@ -68,7 +68,7 @@ def _samples(setting: Setting) -> list[dict[str, Any]]:
     rows = sweep(sample_methods(setting.bench), setting.characters, repeats=3)
     title = f"{NUM_PIXELS} pixels of each of {len(setting.characters)} characters"
     plot_work_precision(rows, setting.picture("samples"), title=title)
-    return [row.as_dict() for row in rows]
+    return [vars(row) for row in rows]
 
 
 def _kind_samples(setting: Setting) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def _kind_samples(setting: Setting) -> dict[str, Any]:
         setting.say(f"kind: {one.name}")
         measured[one.name] = sweep(sample_methods(setting.bench), [one], repeats=1)
     plot_kinds(measured, setting.picture("kind_samples"))
-    return {kind: [row.as_dict() for row in rows] for kind, rows in measured.items()}
+    return {kind: [vars(row) for row in rows] for kind, rows in measured.items()}
 
 
 def _swept(
@@ -87,7 +87,7 @@ def _swept(
     """A sweep of other methods on one character."""
     rows = sweep(methods(setting.bench), setting.characters[:1], repeats=3)
     plot_work_precision(rows, setting.picture(name), title=f"{name}: {NUM_PIXELS} pixels of one character")
-    return [row.as_dict() for row in rows]
+    return [vars(row) for row in rows]
 
 
 def _resolutions(setting: Setting) -> list[dict[str, Any]]:
@@ -99,16 +99,15 @@ def _resolutions(setting: Setting) -> list[dict[str, Any]]:
         network = copy(bench.network)  # that takes drawings of this side as they are
         network.image_size = side
         one = subject(pictured, network)
-        start = time.perf_counter()
+        encode = partial(network.encode, one.views)
         with torch.no_grad():
-            network.encode(one.views)
-        encoding = time.perf_counter() - start
+            timing = in_turns({"encode": encode}, repeats=2, device=one.truth.device)["encode"]
         adaptive = {ADAPTIVE: bench.renderers[ADAPTIVE]}
         measured = measure(one, adaptive, repeats=2, baseline=False, reference=original.converged)[ADAPTIVE]
         rows.append(
             {
                 "side": side,
-                "encode seconds": encoding,
+                "encode seconds": timing.median,
                 "render seconds": measured.seconds,
                 "psnr": measured.psnr,
                 "rms error": measured.rms_error,
@@ -125,7 +124,7 @@ def _arithmetic(setting: Setting) -> list[dict[str, Any]]:
         one = subject(setting.pictured[0], network)
         for method in (CULLED, ADAPTIVE):
             measured = roofline(one, setting.bench.renderers[method])
-            rows.append({"network": name, "renderer": method, **measured.as_dict()})
+            rows.append({"network": name, "renderer": method, **vars(measured)})
     return rows
 
 
@@ -154,12 +153,12 @@ def _memory(setting: Setting) -> list[dict[str, Any]]:
     for work in ("render", "mesh"):
         for side in MEMORY_SIDES:
             peak = peak_memory(work, bench.network, bench.renderers[ADAPTIVE], pictured, size=side)
-            rows.append({"work": work, "side": side, "rise MiB": peak.rise_mib, "seconds": peak.seconds})
+            rows.append({"work": work, "side": side, **vars(peak)})
     return rows
 
 
 def _scaling(setting: Setting) -> list[dict[str, Any]]:
-    grown = [g.as_dict() for g in growths(setting.bench, setting.characters[0], setting.pictured)]
+    grown = [vars(growth) for growth in growths(setting.bench, setting.characters[0], setting.pictured)]
     plot_growth(grown, setting.picture("scaling"))
     return grown
 
@@ -169,7 +168,7 @@ PARTS: dict[str, Part] = {
     "samples": _samples,
     "kinds": _kinds,
     "kind_samples": _kind_samples,
-    "tricks": partial(_swept, trick_methods, "tricks"),
+    "tricks": partial(_swept, tricks, "tricks"),
     "precision": partial(_swept, precision_methods, "precision"),
     "compile": partial(_swept, compiled_methods, "compile"),
     "exactness": _exactness,
@@ -184,7 +183,7 @@ PARTS: dict[str, Part] = {
     "threads": lambda setting: thread_rows(setting.say),
     "losses": _losses,
     "grids": lambda setting: [
-        {"character": one.name, **grid_share(one, cells=256, num_cameras=8).as_dict()}
+        {"character": one.name, **vars(grid_share(one, cells=256, num_cameras=8))}
         for one in setting.characters
     ],
     "meshes": lambda setting: mesh_rows(setting.characters[0]),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch.utils.flop_counter import FlopCounterMode
@@ -39,10 +38,6 @@ class Roofline:
     share: float
     gflop: float
     seconds: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers for JSON."""
-        return dict(vars(self))
 
 
 def matmul_seconds(side: int, device: torch.device) -> float:

@@ -46,10 +46,6 @@ class Growth:
     memory_mib: tuple[float, ...]
     seconds_exponent: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers for JSON."""
-        return dict(vars(self))
-
 
 def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
     """P of value = c * size^p by least squares in logarithms.

@@ -39,17 +39,17 @@ def mark_of(part: Mapping[str, Any]) -> str:
 
 def page(bench: Mapping[str, Any]) -> str:
     """A page of all that was measured, with its diagrams in the same folder."""
-    found = tables(bench)
+    by_mark = tables(bench)
     lines = ["# Error against run time"]
-    if "targets" in found:
-        lines += ["## Targets", found["targets"]]
+    if "targets" in by_mark:
+        lines += ["## Targets", by_mark["targets"]]
     for one in bench["parts"]:
         where = "" if one["characters"] == EMBEDDED else f": {one['characters']}"
         lines.append(f"## {SECTIONS[one['part']][0]}{where}")
         if one["part"] in DRAWN:
             lines.append(f"![{one['part']}]({diagram(one['part'], one['characters'])})")
-        lines.append(found[mark_of(one)])
-    return "\n\n".join([*lines, "## Machine", found["machine"]]) + "\n"
+        lines.append(by_mark[mark_of(one)])
+    return "\n\n".join([*lines, "## Machine", by_mark["machine"]]) + "\n"
 
 
 def _machines(parts: Parts) -> str:
@@ -72,23 +72,23 @@ def _machines(parts: Parts) -> str:
     return markdown(("part", "characters", "machine", "threads", "torch", "weights", "seconds", "note"), rows)
 
 
-def _headline(found: Any) -> list[str]:
-    how = "\n".join(f"- `{name}`: {text}" for name, text in found["headline"]["how"].items())
-    return [headline_table(found["headline"]), how, comparison_table(found["characters"])]
+def _headline(result: Any) -> list[str]:
+    how = "\n".join(f"- `{name}`: {text}" for name, text in result["headline"]["how"].items())
+    return [headline_table(result["headline"]), how, comparison_table(result["characters"])]
 
 
 def _table(text: str = "") -> Show:
-    def show(found: Any) -> list[str]:
-        rows = found if isinstance(found, list) else [found]
+    def show(result: Any) -> list[str]:
+        rows = result if isinstance(result, list) else [result]
         return [*([text] if text else []), rows_table(rows) if rows else "The model has no hull."]
 
     return show
 
 
-def _kind_samples(found: Any) -> list[str]:
+def _kind_samples(result: Any) -> list[str]:
     """The fastest setting of each method that is as accurate as the baseline, on every kind."""
     rows = []
-    for kind, some in found.items():
+    for kind, some in result.items():
         base = next(row for row in some if (row["curve"], row["setting"]) == (BASELINE, BASELINE_SETTING))
         for curve in dict.fromkeys(row["curve"] for row in some):
             good = [row for row in some if row["curve"] == curve and row["rms_error"] <= base["rms_error"]]
@@ -105,18 +105,18 @@ def _kind_samples(found: Any) -> list[str]:
     ]
 
 
-def _size(found: Any) -> list[str]:
-    rows = [{"method": name, **numbers} for name, numbers in found["methods"].items()]
+def _size(result: Any) -> list[str]:
+    rows = [{"method": name, **numbers} for name, numbers in result["methods"].items()]
     return [
-        f"`experiment=pixelnerf scale=paper`: {found['parameters']:,} parameters with its encoder ({found['encoder']}; "
-        f"pixelNeRF counts 13 million more that its ResNet never uses), seeded weights, {found['rays']} rays. Fog, as all "
+        f"`experiment=pixelnerf scale=paper`: {result['parameters']:,} parameters with its encoder ({result['encoder']}; "
+        f"pixelNeRF counts 13 million more that its ResNet never uses), seeded weights, {result['rays']} rays. Fog, as all "
         "untrained fields: a trained field asks adaptive for more samples. Culled with pixelNeRF's numbers of samples, and "
         "with a quarter of them: the hull's segments are a quarter of the box's length or less.",
         rows_table(rows),
     ]
 
 
-def _steps(found: Any) -> list[str]:
+def _steps(result: Any) -> list[str]:
     rows = [
         {
             "scale": one["scale"],
@@ -124,7 +124,7 @@ def _steps(found: Any) -> list[str]:
             **{f"{name} s": value for name, value in one["seconds"].items()},
             **{f"over {name}": value for name, value in one["speedup_of_culled"].items() if name != "culled"},
         }
-        for one in found
+        for one in result
     ]
     return [
         "Encoder, random pixels, loss, gradient and Adam at an equal batch. `pixelNeRF-like` evaluates 64 samples and then "
@@ -134,9 +134,9 @@ def _steps(found: Any) -> list[str]:
     ]
 
 
-def _scaling(found: Any) -> list[str]:
+def _scaling(result: Any) -> list[str]:
     rows = [
-        {k: ", ".join(map(_short, v)) if isinstance(v, list) else v for k, v in one.items()} for one in found
+        {k: ", ".join(map(_short, v)) if isinstance(v, list) else v for k, v in one.items()} for one in result
     ]
     return [rows_table(rows)]
 
@@ -148,7 +148,7 @@ def _short(value: float) -> str:
 SECTIONS: dict[str, tuple[str, Show]] = {
     "headline": ("Headline", _headline),
     "samples": ("Samples a ray and tolerances", _table()),
-    "kinds": ("Kinds of scene", lambda found: [comparison_table(found)]),
+    "kinds": ("Kinds of scene", lambda result: [comparison_table(result)]),
     "kind_samples": ("Samples a ray on kinds of scene", _kind_samples),
     "tricks": ("One trick off at a time", _table()),
     "precision": ("Precision", _table()),

@@ -91,8 +91,8 @@ def _memory(rows: list[Mapping[str, Any]]) -> list[Row]:
     return [
         (
             f"memory of a {row['work']} at 512 within {MEMORY_MIB:,.0f} MiB",
-            f"{row['rise MiB']:,.0f} MiB",
-            row["rise MiB"] <= MEMORY_MIB,
+            f"{row['rise_mib']:,.0f} MiB",
+            row["rise_mib"] <= MEMORY_MIB,
         )
         for row in rows
         if row["side"] == 512

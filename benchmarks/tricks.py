@@ -22,8 +22,8 @@ from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
 
-def variants(bench: Workbench) -> dict[str, Method]:
-    """By name what renders a subject with a trick off."""
+def tricks(bench: Workbench) -> dict[tuple[str, str], Method]:
+    """By (curve, name) what renders a subject with a trick off while the others stay on, as renderer=culled does."""
     culled = bench.renderers[CULLED]
     like = bench.like
 
@@ -56,7 +56,7 @@ def variants(bench: Workbench) -> dict[str, Method]:
         field = FunctionField(subject.scene.coarse, bytes_per_point=1)
         return partial(renderer.render, replace(subject.scene, coarse=field), subject.rays)
 
-    return {
+    variants = {
         "all on": on,
         "packing off": unpacked,
         "hull segments off": without_hull_segments,
@@ -64,6 +64,7 @@ def variants(bench: Workbench) -> dict[str, Method]:
         "hoisting off": unhoisted,
         "chunks off (one batch)": huge_chunks,
     }
+    return {("one trick off", name): method for name, method in variants.items()}
 
 
 def _scene_by(subject: Subject, function: Callable[[Tensor, Tensor], FieldOutput]) -> Scene:
@@ -110,8 +111,3 @@ def _unhoisted(subject: Subject) -> Callable[[Tensor, Tensor], FieldOutput]:
         return field(replace(seen, latents=field.from_latents(seen.latents) * seen.valid[..., None]))
 
     return answer
-
-
-def trick_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
-    """Each trick off while the others stay on, by renderer=culled with its own number of samples."""
-    return {("one trick off", name): build for name, build in variants(bench).items()}

@@ -8,11 +8,12 @@ import pytest
 import torch
 
 from benchmarks import __main__ as command
+from benchmarks import threads
 from benchmarks.losses import compared_curves, loss_curves
 from benchmarks.parts import PARTS
 from benchmarks.plots import plot_kinds, plot_losses
 from benchmarks.setting import Setting
-from benchmarks.tables import SECTIONS, page, tables
+from benchmarks.tables import DRAWN, SECTIONS, page, tables
 from benchmarks.targets import target_rows
 from charnerf.bench.subjects import subject
 from charnerf.bench.sweep import Row
@@ -189,3 +190,16 @@ def test_sections_show_their_numbers():
         ["8", "0.25", "8"]
     ]
     assert text.count("| base ") == 1 and "over pixelNeRF-like" in text
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name == "hull" else pytest.mark.slow) for name in PARTS]
+)
+def test_parts_run_on_the_released_weights(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(threads, "SECONDS", 3)
+    monkeypatch.setattr(threads, "ROUNDS", 1)
+    command.main(["--part", name, "-o", str(tmp_path), "--device", "cpu"])
+    (part,) = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))["parts"]
+    assert part["part"] == name and part["result"]
+    assert (tmp_path / f"{name}.png").is_file() == (name in DRAWN)
+    assert SECTIONS[name][0] in (tmp_path / "bench.md").read_text(encoding="utf-8")

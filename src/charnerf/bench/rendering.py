@@ -46,7 +46,7 @@ class Measured:
 
     def as_dict(self) -> dict[str, Any]:
         """Numbers for JSON."""
-        found: dict[str, Any] = {
+        numbers: dict[str, Any] = {
             "seconds": self.seconds,
             "seconds_low": self.timing.low,
             "seconds_high": self.timing.high,
@@ -57,9 +57,9 @@ class Measured:
             "max_error": self.max_error,
         }
         if self.left_out is not None:
-            found["left_out"] = self.left_out.shares()
+            numbers["left_out"] = self.left_out.shares()
         if self.estimate is not None:
-            found["tolerance"] = {
+            numbers["tolerance"] = {
                 "asked": self.estimate.asked,
                 "estimated": float(self.estimate.estimated.amax()),
                 "true": self.max_error,
@@ -68,7 +68,7 @@ class Measured:
                 "rays_stopped": self.estimate.num_stopped,
                 "rays_unresolved": self.estimate.num_unresolved,
             }
-        return found
+        return numbers
 
 
 def measure(

@@ -59,7 +59,7 @@ def run(
     if not quick:
         tell("samples a ray and tolerances")
         rows = sweep(sample_methods(bench), subjects, repeats=3)
-        result["samples"] = [row.as_dict() for row in rows]
+        result["samples"] = [vars(row) for row in rows]
         if output is not None:
             title = f"{NUM_PIXELS} pixels of each of {len(subjects)} characters"
             plot_work_precision(rows, output / SAMPLES_PICTURE, title=title)

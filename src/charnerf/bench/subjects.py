@@ -113,13 +113,13 @@ def captured(name: str, scene: trimesh.Scene, size: int) -> Pictured:
 
 def of_dataset(root: Path, split: str, count: int | None) -> list[Pictured]:
     """The first characters of a split of a data set, all if there is no count."""
-    found = []
+    pictured = []
     for name in names_of(read_dataset(root), split)[:count]:
         character = load_character(root, name)
         view = character.cameras.shape[0] // 2
         picture = character.images([view])[0].float() / 255.0
-        found.append(Pictured(name, character.sources, character.cameras[view], picture))
-    return found
+        pictured.append(Pictured(name, character.sources, character.cameras[view], picture))
+    return pictured
 
 
 def prepared(network: CharNeRF, pictured: Sequence[Pictured]) -> list[Subject]:

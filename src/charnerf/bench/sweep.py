@@ -50,10 +50,6 @@ class Row:
     max_error: float
     psnr: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """Numbers for JSON."""
-        return dict(vars(self))
-
 
 def sweep(
     methods: Mapping[tuple[str, str], Method],

@@ -1,24 +1,17 @@
-"""Results as plain text and Markdown tables."""
+"""Results as Markdown tables."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from charnerf.markdown import table
+
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """A Markdown table; numbers get three significant digits."""
-    cells = [[_shown(value) for value in row] for row in rows]
-    widths = [
-        max(len(name), *(len(row[i]) for row in cells)) if cells else len(name)
-        for i, name in enumerate(header)
-    ]
-    lines = [header, ["-" * width for width in widths], *cells]
-    return "\n".join(
-        "| " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) + " |"
-        for line in lines
-    )
+    return "\n".join(table(header, [[_text(value) for value in row] for row in rows]))
 
 
-def _shown(value: Any) -> str:
+def _text(value: Any) -> str:
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "-"}[value]
     if isinstance(value, float):
@@ -42,34 +35,21 @@ def comparison_table(comparisons: Sequence[Mapping[str, Any]]) -> str:
     """Methods on subjects: rays a second, speed-up, errors, what is left."""
     rows = []
     for one in comparisons:
-        for name, found in one["methods"].items():
-            shares = found.get("left_out", {})
-            left = shares.get("samples")
-            tolerance = found.get("tolerance", {})
+        for name, measured in one["methods"].items():
+            left_out = measured.get("left_out", {}).get("samples")
+            tolerance = measured.get("tolerance", {})
             rows.append(
-                (
-                    one["name"],
-                    name,
-                    found["rays_per_second"],
-                    one["speedup"].get(name, 1.0),
-                    found["psnr"],
-                    found["rms_error"],
-                    found["max_error"],
-                    tolerance.get("estimated"),
-                    tolerance.get("asked"),
-                    None if left is None else 100.0 * (1.0 - left),
-                )
+                {
+                    "subject": one["name"],
+                    "method": name,
+                    "rays/s": measured["rays_per_second"],
+                    "speed-up": one["speedup"].get(name, 1.0),
+                    "PSNR dB": measured["psnr"],
+                    "rms error": measured["rms_error"],
+                    "max error": measured["max_error"],
+                    "estimated": tolerance.get("estimated"),
+                    "tolerance": tolerance.get("asked"),
+                    "samples left %": None if left_out is None else 100.0 * (1.0 - left_out),
+                }
             )
-    header = (
-        "subject",
-        "method",
-        "rays/s",
-        "speed-up",
-        "PSNR dB",
-        "rms error",
-        "max error",
-        "estimated",
-        "asked",
-        "samples left %",
-    )
-    return markdown(header, rows)
+    return rows_table(rows)
