@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.files import write_aside, write_bytes, write_text
+from charnerf.files import write_aside, write_bytes, write_folder_aside, write_text
 
 
 def test_the_old_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
@@ -38,3 +38,28 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
     (tmp_path / "plain").write_text("")
     write_text(tmp_path / "aside", "")
     assert (tmp_path / "aside").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_a_folder_appears_at_once_and_later_its_pieces_are_replaced(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "out"
+    for content, names in (("old", {"own.txt", "same", "old"}), ("new", {"own.txt", "same", "old", "new"})):
+        with write_folder_aside(folder) as aside:
+            assert folder.exists() == (content == "new")
+            (aside / "same").mkdir()
+            (aside / "same" / content).write_text("")
+            (aside / content).write_text(content)
+        (folder / "own.txt").write_text("the user's")
+        assert {path.name for path in folder.iterdir()} == names
+        assert [path.name for path in (folder / "same").iterdir()] == [content]
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_a_failure_leaves_the_old_folder_and_nothing_else(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "a").write_text("old")
+    with pytest.raises(RuntimeError), write_folder_aside(folder) as aside:
+        (aside / "a").write_text("half")
+        raise RuntimeError
+    assert (folder / "a").read_text() == "old"
+    assert list(tmp_path.iterdir()) == [folder]

@@ -1,6 +1,8 @@
 """Files that are there whole or not at all: written beside their place, then renamed into it; and locks between processes."""
 
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -54,3 +56,41 @@ def write_bytes(path: Path, content: bytes) -> None:
     """Write a file, whole or not at all."""
     with write_aside(path) as aside:
         aside.write_bytes(content)
+
+
+@contextmanager
+def write_folder_aside(path: Path) -> Iterator[Path]:
+    """A folder beside `path` to write into: when the block ends it becomes `path`, and it goes if the block raises.
+
+    Where there is a folder already its pieces are replaced one by one, and others in it stay. Folders that `path` lacks are
+    made.
+
+    Args:
+        path: The folder to write.
+
+    Yields:
+        A hidden folder in the same folder.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+    try:
+        yield aside
+        if path.exists():
+            for piece in sorted(aside.iterdir()):
+                _replace(piece, path / piece.name)
+        else:
+            aside.chmod(0o755)
+            aside.rename(path)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _replace(piece: Path, target: Path) -> None:
+    """Move a file or folder to where another one may be."""
+    if target.is_dir() and not target.is_symlink():
+        old = piece.with_name(f"{piece.name}.old")
+        target.rename(old)
+        piece.replace(target)
+        shutil.rmtree(old)
+    else:
+        piece.replace(target)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
-import shutil
-import tempfile
 from dataclasses import asdict, fields
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from charnerf.drawings.turnaround import Turnaround
+from charnerf.files import write_folder_aside
 from charnerf.finetuning.finetune import LEARNING, CurvePoint, Finetuned
 from charnerf.finetuning.recipe import Recipe
 from charnerf.inference.weights import save_config, save_weights
@@ -33,19 +32,12 @@ def write_finetuned(done: Finetuned, output: Path, *, recipe: Recipe, drawings: 
     Returns:
         The report.
     """
-    output.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(dir=output.parent, prefix=f".{output.name}."))
-    try:
+    with write_folder_aside(output) as aside:
         save_weights(aside / "weights.safetensors", done.model.network, done.model.config, note=note_of(done))
         save_config(aside, done.model.config)
         write_curve(done, aside / "curve.csv")
         plot_curve(done, aside / "curve.png")
         (aside / "report.md").write_text(report_text(done, recipe, drawings), encoding="utf-8")
-        output.mkdir(exist_ok=True)
-        for piece in sorted(aside.iterdir()):
-            piece.replace(output / piece.name)
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
     return output / "report.md"
 
 

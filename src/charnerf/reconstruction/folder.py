@@ -1,7 +1,5 @@
 """Drawings to a folder: mesh.glb, turntable.mp4, views and report.md."""
 
-import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,6 +13,7 @@ from tqdm import tqdm
 from charnerf.drawings.turnaround import Picture, Turnaround
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
+from charnerf.files import write_folder_aside
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import plot_curve, summary_lines
@@ -104,10 +103,12 @@ def reconstruct(
     pictures, built = _pictures_and_mesh(hero.symmetric() if options.symmetric else hero, options, seconds)
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
         say(line)
-    with _aside(output) as folder:
+    with write_folder_aside(output) as folder:
         if sheet is not None:
             Image.fromarray(sheet).save(folder / "sheet_as_read.png")
         film, views = _write_pieces(folder, pictures, built, drawings, refined, seconds, model.source.name)
+    for other in {"turntable.mp4", "turntable.gif"} - {film}:  # of a reconstruction before
+        (output / other).unlink(missing_ok=True)
     return Reconstruction(
         mesh=output / "mesh.glb",
         turntable=output / film,
@@ -175,18 +176,6 @@ def _write_pieces(
     return film.name, [view.name for view in views]
 
 
-@contextmanager
-def _aside(output: Path) -> Iterator[Path]:
-    """A folder beside OUTPUT to write into; what lies in it is moved into OUTPUT where nothing went wrong."""
-    output.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(dir=output.parent, prefix=f".{output.name}."))
-    try:
-        yield folder
-        _move_into(folder, output)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def _write_views(pictures: list[np.ndarray], folder: Path) -> list[Path]:
     """Write up to MOST_VIEWS of the frames, evenly chosen, as PNG files named by azimuth."""
     folder.mkdir()
@@ -196,22 +185,3 @@ def _write_views(pictures: list[np.ndarray], folder: Path) -> list[Path]:
         Image.fromarray(pictures[index]).save(path)
         paths.append(path)
     return paths
-
-
-def _move_into(aside: Path, folder: Path) -> None:
-    """Move what was written aside into its place: at once where the folder is new, else piece by piece."""
-    if not folder.exists():
-        aside.chmod(0o755)
-        aside.rename(folder)
-        return
-    for film in ("turntable.mp4", "turntable.gif"):
-        if not (aside / film).exists():
-            (folder / film).unlink(missing_ok=True)
-    for piece in sorted(aside.iterdir()):
-        target = folder / piece.name
-        if target.is_dir() and not target.is_symlink():
-            target.rename(aside.with_name(f"{aside.name}.old"))
-            piece.replace(target)
-            shutil.rmtree(aside.with_name(f"{aside.name}.old"))
-        else:
-            piece.replace(target)

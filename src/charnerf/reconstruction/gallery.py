@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from charnerf.errors import DataError
+from charnerf.files import write_aside
 from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
 from charnerf.pictures import bytes_on_white
@@ -51,10 +52,8 @@ def write_gallery(model: Model, folders: Sequence[Path], output: Path, *, size: 
             sheet.paste(panel, (_left(column, size), top))
     x = _left(len(DRAWN), size) - _GAP // 2
     pen.line((x, 4, x, sheet.height - 4), fill=_RULE)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    aside = output.with_name(f".{output.name}.part")
-    sheet.save(aside, format="PNG", optimize=True)
-    aside.replace(output)
+    with write_aside(output) as aside:
+        sheet.save(aside, format="PNG", optimize=True)
     return output
 
 
