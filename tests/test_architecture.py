@@ -40,6 +40,8 @@ ONLY_IN = {  # foreign package: where it may be imported
         "config",
         "inference",
         "training/run",
+        "training/data",
+        "training/trainer",
         "training/start",
         "training/finish",
         "training/cells",

@@ -10,10 +10,12 @@ from omegaconf import DictConfig
 
 from charnerf.config.composition import compose_config
 from charnerf.data.datamodule import MixedDataModule
-from charnerf.inference.build import build_model, build_part, build_renderer
+from charnerf.inference.build import build_model, build_renderer
 from charnerf.training.clock import RunClock
+from charnerf.training.data import build_data
 from charnerf.training.module import TrainingModule
-from charnerf.training.run import build_data, build_losses, build_trainer, training_renderer
+from charnerf.training.run import build_losses, build_module
+from charnerf.training.trainer import build_trainer
 
 
 def smoke_config(root: Path, *overrides: str) -> DictConfig:
@@ -68,16 +70,7 @@ def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> Sma
     model = build_model(cfg)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     losses, needs = build_losses(cfg)
-    module = TrainingModule(
-        model=model,
-        renderer=training_renderer(cfg),
-        eval_renderer=build_renderer(cfg),
-        losses=losses,
-        optimizer=build_part(cfg.optimizer),
-        final_rate=cfg.optimization.final_lr_scale,
-        position=clock.position,
-        seed=cfg.seed,
-    )
+    module = build_module(cfg, model, build_renderer(cfg), losses, clock)
     data = build_data(cfg, Path(cfg.data.root), model, clock, needs)
     trainer = build_trainer(cfg, folder, clock, losses.names)
     recorder = Recorder(cut_at=cut_at)

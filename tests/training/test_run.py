@@ -13,9 +13,11 @@ from charnerf.errors import ConfigError, DataError
 from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.inference.build import build_model
 from charnerf.inference.weights import load, load_config
+from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.clock import RunClock
 from charnerf.training.optimization import rate_at
-from charnerf.training.run import begin, find_checkpoint, run_training, training_renderer
+from charnerf.training.run import run_training, training_renderer
+from charnerf.training.start import begin
 from support import small_runs
 
 STEPS = 40

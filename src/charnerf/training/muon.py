@@ -29,7 +29,9 @@ class MuonWithAdam(torch.optim.Optimizer):
         ValueError: If a rate is not positive.
 
     Source: Jordan et al. 2024, "Muon: an optimizer for hidden layers in neural networks"; filters count as matrices of
-        (output channels, input channels * height * width), which torch.optim.Muon does not take. Kingma & Ba 2015.
+        (output channels, input channels * height * width). Kingma & Ba 2015. torch.optim.Muon, without weight decay,
+        takes the same step of a matrix but turns it in bfloat16 (1.3 to 1.6 % of the step's length away from ours),
+        takes no filters, and turns one matrix at a time (twice the time for 16 of 64 x 64).
     """
 
     def __init__(self, params: Iterable[Tensor], *, lr: float, matrix_lr: float) -> None:

@@ -1,0 +1,86 @@
+"""The data of a run: its splits, and a datamodule that opens what the loss needs."""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from omegaconf import DictConfig
+
+from charnerf.data.augmentation.sequence import AugmentationSequence
+from charnerf.data.characters import Character
+from charnerf.data.datamodule import MixedDataModule
+from charnerf.data.layout import names_of, read_dataset
+from charnerf.data.mixed import MixedDataset
+from charnerf.data.sampler import PhaseSampler
+from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
+from charnerf.data.surface import AbstractSurface
+from charnerf.inference.build import build_part
+from charnerf.losses.base import Needs
+from charnerf.models.charnerf import CharNeRF
+from charnerf.surfaces.mesh_files import load_surface_mesh
+from charnerf.training.clock import RunClock
+
+log = logging.getLogger(__name__)
+
+
+def check_splits(root: Path, splits: DictConfig) -> None:
+    """Check that every split that a run reads has characters; the last is read after training.
+
+    Raises:
+        DataError: If one has none.
+    """
+    info = read_dataset(root)
+    for split in (*splits.train, splits.val, splits.test):
+        names_of(info, split)
+
+
+def build_data(
+    cfg: DictConfig, root: Path, model: CharNeRF, clock: RunClock, needs: Needs
+) -> MixedDataModule:
+    """The datamodule; what no loss needs is not opened."""
+    splits, batches, validation = cfg.splits, cfg.batches, cfg.validation
+
+    def make_dataset(store: CharacterStore) -> MixedDataset:
+        return MixedDataset(
+            store=store,
+            characters=cfg.scale.batch_characters,
+            foreground_share=batches.foreground_share,
+            needs=needs,
+            used_views=model.views,
+            augmentation=AugmentationSequence(
+                [build_part(one, {"used_views": model.views}) for one in cfg.augmentation.values()]
+            ),
+            seed=cfg.seed,
+        )
+
+    return MixedDataModule(
+        root=root,
+        train_splits=list(splits.train),
+        val_split=splits.val,
+        val_characters=validation.characters,
+        val_views=validation.views,
+        carve=model.carve,
+        memory_mib=batches.memory_mib,
+        workers=batches.workers,
+        surface_of=_surface_of(cfg) if needs.surface else no_surface,
+        make_dataset=make_dataset,
+        sampler=PhaseSampler(
+            schedule=build_part(cfg.schedule), position=clock.position, num_marks=validation.times
+        ),
+    )
+
+
+def _surface_of(cfg: DictConfig) -> SurfaceOf:
+    """Opens a character's surface; None without a mesh, which is logged once."""
+    make_surface: Callable[..., AbstractSurface] = build_part(cfg.surface)
+    told: set[str] = set()
+
+    def surface_of(character: Character) -> AbstractSurface | None:
+        if character.mesh_file is None:
+            if not told:
+                log.warning("Character %s has no mesh: it is trained by rays alone.", character.name)
+                told.add(character.name)
+            return None
+        return make_surface(load_surface_mesh(character.mesh_file))
+
+    return surface_of
