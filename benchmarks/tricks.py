@@ -8,13 +8,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import torch
 from torch import Tensor
 
 from charnerf.bench.baseline import PixelNeRFLike
 from charnerf.bench.subjects import Subject
 from charnerf.bench.sweep import Method
 from charnerf.bench.workbench import CULLED, Workbench
+from charnerf.models.character import CharacterField
 from charnerf.models.lookup import maps_to_rows
 from charnerf.scene import FunctionField, Scene
 from charnerf.types import FieldOutput
@@ -95,19 +95,14 @@ def _spacing(subject: Subject, culled: CulledRenderer) -> float:
 
 def _unhoisted(subject: Subject) -> Callable[[Tensor, Tensor], FieldOutput]:
     """The field with its linear layer applied to what is read at each point."""
-    network, field, views = subject.network, subject.network.coarse, subject.maps.views
-    maps = subject.maps.feature_maps
-    present = torch.arange(len(maps), device=maps.device)
-    seen_by = network.view_maps(views, subject.maps.hull, present, maps)
-    inputs = partial(
-        network.point_inputs,
-        maps=seen_by,
-        latents=maps_to_rows(maps),
-        mirrored=views.mirrored.to(maps.dtype),
-    )
+    hoisted = subject.scene.coarse
+    assert isinstance(hoisted, CharacterField)
+    field, rows = hoisted.field, maps_to_rows(subject.maps.feature_maps)
 
     def answer(points: Tensor, dirs: Tensor) -> FieldOutput:
-        seen = inputs(points, dirs)
-        return field(replace(seen, latents=field.from_latents(seen.latents) * seen.valid[..., None]))
+        inputs = hoisted.maps.read(points, rows)
+        latents = field.from_latents(inputs.latents) * inputs.views.valid[..., None]
+        output: FieldOutput = field(replace(inputs, latents=latents), dirs)
+        return output
 
     return answer

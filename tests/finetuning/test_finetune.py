@@ -1,4 +1,4 @@
-"""Fine-tuning: what is known once answers as the model does, what is frozen stays, nothing gets worse."""
+"""Fine-tuning: what is cached answers as the model does, what is frozen stays, nothing gets worse."""
 
 import copy
 from dataclasses import replace
@@ -10,8 +10,8 @@ from omegaconf import OmegaConf
 
 from charnerf.errors import ConfigError, DataError
 from charnerf.finetuning import Recipe, finetune
+from charnerf.finetuning.cached_rays import cache, place, render_cached
 from charnerf.finetuning.finetune import learning_parts
-from charnerf.finetuning.known import finest, know, place, render_known
 from charnerf.finetuning.regions import held_out_patches
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.inference.model import Model
@@ -39,7 +39,7 @@ def _model(*, fine: bool = False, shaken: bool = True, **parts) -> Model:
 
 @pytest.mark.parametrize("density", ["view_free", "view_dependent"])
 @pytest.mark.parametrize("fine", [False, True])
-def test_known_samples_are_rendered_as_the_renderer_does(person_views, density, fine):
+def test_cached_samples_are_rendered_as_the_renderer_does(person_views, density, fine):
     model = _model(fine=fine, density=density, views="mirrored")
     network, renderer = model.network, model.renderer
     camera = helpers.target_cameras(3)[1]
@@ -49,9 +49,9 @@ def test_known_samples_are_rendered_as_the_renderer_does(person_views, density, 
         scene = network.scene(encoded, 0)
         expected = renderer.render(scene, rays).finest
         placed, hit = place(renderer, scene, rays, None)
-        known = know(network, encoded, placed)
-        index = torch.randperm(len(known))
-        rgb, opacity = render_known(finest(network), renderer, known, index)
+        cached = cache(scene.field, placed)
+        index = torch.randperm(len(cached))
+        rgb, opacity = render_cached(network.finest, renderer, cached, index)
     assert 0 < len(hit) < len(rays.origins)
     torch.testing.assert_close(rgb, expected.rgb[hit][index], atol=2e-6, rtol=1e-5)
     torch.testing.assert_close(opacity, expected.opacity[hit][index], atol=2e-6, rtol=1e-5)

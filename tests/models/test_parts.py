@@ -7,8 +7,6 @@ import torch
 
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import mirror_cameras
-from charnerf.geometry.safe import safe_normalize
-from charnerf.models.features.base import ViewReadings
 from charnerf.models.features.image import ImageFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
 from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
@@ -18,7 +16,6 @@ from charnerf.models.features.image_hull_section_consistency import (
 )
 from charnerf.models.heads.blend import BlendHead
 from charnerf.models.heads.radiance import RadianceHead
-from charnerf.models.inputs import PointInputs
 from charnerf.models.mlp import residual_blocks
 from charnerf.models.stages import encode_directions
 from charnerf.models.views.first import FirstViews
@@ -26,70 +23,53 @@ from charnerf.models.views.mirrored import MirroredSide
 from charnerf.models.views.turnaround import Turnaround
 from charnerf.types import SourceViews
 from support import helpers, tiny_models
+from support.random_inputs import field_inputs, point_views, random_dirs
 
 WIDTH = tiny_models.WIDTH
 
 
-def point_inputs(num_points: int = 9, num_views: int = 3, *, point_features: int = 0) -> PointInputs:
-    """Random points as views see them, float64."""
-    random = lambda *shape: torch.randn(*shape, dtype=torch.float64)  # noqa: E731
-    return PointInputs(
-        latents=random(num_points, num_views, WIDTH),
-        point_features=random(num_points, num_views, point_features),
-        source_rgb=torch.rand(num_points, num_views, 3, dtype=torch.float64),
-        uv=torch.rand(num_points, num_views, 2, dtype=torch.float64),
-        visibility=torch.rand(num_points, num_views, dtype=torch.float64),
-        valid=torch.rand(num_points, num_views) < 0.6,
-        encoded_points=random(num_points, 6 * tiny_models.FREQUENCIES),
-        view_dirs=safe_normalize(random(num_points, 3)),
-        source_dirs=safe_normalize(random(num_points, num_views, 3)),
-        kept=torch.ones(num_points, dtype=torch.float64),
-    )
-
-
 def test_a_closed_gate_keeps_the_blend_within_the_source_colours():
     """A convex combination of the colours of the valid views; with one valid view, its very colour."""
-    inputs = point_inputs(200)
+    seen, dirs = point_views(200), random_dirs(200)
     head = tiny_models.shake(BlendHead(width=WIDTH, hidden=8).double())
     with torch.no_grad():
         head.free.bias[3] = -1e4
     features, views = torch.randn(200, WIDTH).double(), torch.randn(200, 3, WIDTH).double()
-    rgb = head(features, views, inputs)
-    counted = (inputs.valid | ~inputs.valid.any(-1, keepdim=True))[..., None]
-    low = torch.where(counted, inputs.source_rgb, 2.0).amin(1)
-    high = torch.where(counted, inputs.source_rgb, -1.0).amax(1)
+    rgb = head(features, views, seen, dirs)
+    counted = (seen.valid | ~seen.valid.any(-1, keepdim=True))[..., None]
+    low = torch.where(counted, seen.rgb, 2.0).amin(1)
+    high = torch.where(counted, seen.rgb, -1.0).amax(1)
     assert ((rgb >= low - 1e-12) & (rgb <= high + 1e-12)).all()
-    one = inputs.valid.sum(-1) == 1
-    torch.testing.assert_close(rgb[one], inputs.source_rgb[inputs.valid & one[:, None]])
+    one = seen.valid.sum(-1) == 1
+    torch.testing.assert_close(rgb[one], seen.rgb[seen.valid & one[:, None]])
     with torch.no_grad():
         head.free.bias[3] = 1e4
-    free = head(features, views, inputs)
-    other = head(features, views, replace(inputs, source_rgb=1.0 - inputs.source_rgb))
+    free = head(features, views, seen, dirs)
+    other = head(features, views, replace(seen, rgb=1.0 - seen.rgb), dirs)
     torch.testing.assert_close(free, other)  # wide open, the drawings' colours do not matter
 
 
 def test_a_new_blend_head_prefers_the_view_that_sees_the_point():
-    inputs = point_inputs(50, 2)
-    visibility = torch.tensor((1.0, 0.0)).double().expand(50, 2)
-    inputs = replace(inputs, visibility=visibility, valid=torch.ones(50, 2, dtype=torch.bool))
+    behind = torch.tensor((0.0, torch.inf)).double().expand(50, 2)  # visibility 1 and 0
+    seen = replace(point_views(50, 2), behind=behind, valid=torch.ones(50, 2, dtype=torch.bool))
     head = BlendHead(width=WIDTH, hidden=8).double()
     with torch.no_grad():
         head.free.bias[3] = -1e4
         head.score.weight.zero_()
-    rgb = head(torch.zeros(50, WIDTH).double(), torch.zeros(50, 2, WIDTH).double(), inputs)
+    rgb = head(torch.zeros(50, WIDTH).double(), torch.zeros(50, 2, WIDTH).double(), seen, random_dirs(50))
     share = torch.sigmoid(torch.tensor(2.0)).double()
-    torch.testing.assert_close(rgb, share * inputs.source_rgb[:, 0] + (1 - share) * inputs.source_rgb[:, 1])
+    torch.testing.assert_close(rgb, share * seen.rgb[:, 0] + (1 - share) * seen.rgb[:, 1])
 
 
 @pytest.mark.parametrize("head", [BlendHead(width=WIDTH, hidden=8), RadianceHead(width=WIDTH)])
 def test_heads_answer_colours_and_pass_gradcheck(head):
     head = tiny_models.shake(head.double())
-    inputs = point_inputs(4)
+    seen, dirs = point_views(4), random_dirs(4)
     features = torch.randn(4, WIDTH, dtype=torch.float64, requires_grad=True)
     views = torch.randn(4, 3, WIDTH, dtype=torch.float64, requires_grad=True)
-    rgb = head(50.0 * features, 50.0 * views, inputs)
+    rgb = head(50.0 * features, 50.0 * views, seen, dirs)
     assert ((rgb >= 0) & (rgb <= 1)).all()
-    assert torch.autograd.gradcheck(lambda f, v: head(f, v, inputs), (features, views))
+    assert torch.autograd.gradcheck(lambda f, v: head(f, v, seen, dirs), (features, views))
 
 
 @pytest.mark.parametrize("combining", tiny_models.COMBINATORS)
@@ -99,10 +79,9 @@ def test_what_sees_directions(combining, density, head):
     """view_free: the density is one number a point and only the colour turns with the query; else both do."""
     field = tiny_models.tiny_model(combining=combining, density=density, head=head, features="image").coarse
     field = tiny_models.shake(field.double())
-    inputs = point_inputs()
+    inputs = field_inputs()
     with torch.no_grad():
-        one = field(inputs)
-        other = field(replace(inputs, view_dirs=safe_normalize(torch.randn(9, 3, dtype=torch.float64))))
+        one, other = field(inputs, random_dirs()), field(inputs, random_dirs())
     assert torch.equal(one.densities, other.densities) != field.density.sees_directions
     assert (one.rgb - other.rgb).abs().amax() > 1e-3
     assert (one.densities >= 0).all() and field.density.sees_directions == (density != "view_free")
@@ -113,14 +92,12 @@ def test_a_field_of_one_to_eight_views(num_views):
     """Any number, in any order, with a finite gradient for every parameter."""
     model = tiny_models.tiny_model(features="image")
     field = tiny_models.shake(model.coarse.double())
-    inputs = point_inputs(6, num_views)
-    answer = field(inputs)
+    inputs, dirs = field_inputs(6, num_views), random_dirs(6)
+    answer = field(inputs, dirs)
     order = torch.randperm(num_views)
-    turned = {
-        name: getattr(inputs, name)[:, order]
-        for name in ("latents", "point_features", "source_rgb", "visibility", "valid", "source_dirs")
-    }
-    again = field(replace(inputs, **turned))
+    seen = {name: getattr(inputs.views, name)[:, order] for name in ("rgb", "uv", "dirs", "behind", "valid")}
+    turned = replace(inputs, views=replace(inputs.views, **seen), latents=inputs.latents[:, order])
+    again = field(turned, dirs)
     torch.testing.assert_close(again.rgb, answer.rgb)
     torch.testing.assert_close(again.densities, answer.densities)
     (answer.rgb.sum() + answer.densities.sum()).backward()
@@ -145,29 +122,35 @@ def test_new_residual_blocks_are_the_identity():
 
 
 def test_image_hull_features_by_hand():
-    readings = ViewReadings(
-        source_rgb=torch.tensor((((0.0, 0.5, 1.0), (0.0, 0.0, 0.0)),)),
+    inputs = field_inputs(1, 2)
+    seen = replace(
+        inputs.views,
+        rgb=torch.tensor((((0.0, 0.5, 1.0), (0.0, 0.0, 0.0)),)),
         behind=torch.tensor(((0.1, 0.0),)),
+        dirs=torch.tensor((((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),)),
+    )
+    inputs = replace(
+        inputs,
+        views=seen,
         edge=torch.tensor(((-0.02, 0.01),)),  # the smallest that counts is the second: the first is mirrored
-        source_dirs=torch.tensor((((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),)),
         mirrored=torch.tensor((1.0, 0.0)),
-        places=torch.tensor(((0.5, -1.0, 0.25),)),
-        half_lengths=torch.tensor(((0.1, 0.2, 0.8),)) / 1.8,
+        section_places=torch.tensor(((0.5, -1.0, 0.25),)),
+        section_lengths=torch.tensor(((0.1, 0.2, 0.8),)) / 1.8,
     )
     numbers = torch.tanh(torch.tensor((0.4, 2.0, 8.0, -0.16, -0.8, -3.2, 0.08, 0.4, 1.6)))
     expected = torch.cat((numbers, torch.tensor((1.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0))))
     features = ImageHullFeatures()
-    torch.testing.assert_close(features(readings)[0, 0], expected)
+    torch.testing.assert_close(features(inputs)[0, 0], expected)
     assert features.num_point_features == 16
     section = torch.tensor((0.5, -1.0, 0.25, 0.25, 1.0, 0.0625, 0.3125, 1.25, 1.0625, 0.0, 1 / 3, 1.0))
     both = ImageHullSectionFeatures()
-    torch.testing.assert_close(both(readings)[0, 1], torch.cat((features(readings)[0, 1], section)))
+    torch.testing.assert_close(both(inputs)[0, 1], torch.cat((features(inputs)[0, 1], section)))
     assert both.num_point_features == 28
     all_three = ImageHullSectionConsistencyFeatures()
-    torch.testing.assert_close(all_three(readings)[..., :28], both(readings))
-    torch.testing.assert_close(all_three(readings)[..., 28:], consistency(readings.source_rgb))
+    torch.testing.assert_close(all_three(inputs)[..., :28], both(inputs))
+    torch.testing.assert_close(all_three(inputs)[..., 28:], consistency(seen.rgb))
     assert all_three.num_point_features == 36
-    assert ImageFeatures()(readings).shape == (1, 2, 0) and ImageFeatures().num_point_features == 0
+    assert ImageFeatures()(inputs).shape == (1, 2, 0) and ImageFeatures().num_point_features == 0
 
 
 def test_consistency_by_hand():

@@ -6,33 +6,21 @@ import pytest
 import torch
 
 from charnerf.geometry.safe import safe_normalize
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import FieldInputs
 from charnerf.models.single_view.camera import CameraSingleView
 from support import tiny_models
+from support.random_inputs import field_inputs
 
 WIDTH = tiny_models.WIDTH
 
 
-def inputs_of(
-    f1, points: torch.Tensor, view_dirs: torch.Tensor, rotations: torch.Tensor, point_features: int = 0
-) -> PointInputs:
+def inputs_of(f1, points: torch.Tensor, rotations: torch.Tensor) -> FieldInputs:
     """Points as views with these axes see them, the same features whatever the axes are."""
-    count, views = len(points), len(rotations)
-    random = lambda *shape: torch.randn(  # noqa: E731
-        *shape, dtype=torch.float64, generator=torch.Generator().manual_seed(5)
+    views = len(rotations)
+    latents = torch.randn(
+        len(points), views, f1.latent_size, dtype=torch.float64, generator=torch.Generator().manual_seed(5)
     )
-    return PointInputs(
-        latents=random(count, views, f1.latent_size),
-        point_features=random(count, views, point_features),
-        source_rgb=random(count, views, 3),
-        uv=torch.rand(count, views, 2, dtype=torch.float64),
-        visibility=random(count, views),
-        valid=torch.ones(count, views, dtype=torch.bool),
-        encoded_points=f1.locate(points, rotations),
-        view_dirs=view_dirs,
-        source_dirs=random(count, views, 3),
-        kept=torch.ones(count, dtype=torch.float64),
-    )
+    return replace(field_inputs(len(points), views), latents=latents, box_points=points, rotations=rotations)
 
 
 def axes(count: int) -> torch.Tensor:
@@ -46,13 +34,13 @@ def test_pixelnerfs_code_by_hand():
     f1 = CameraSingleView(width=4, num_point_features=0, num_blocks=3, octaves=6, factor=1.5)
     rotation = axes(2)
     points = torch.rand(5, 3, dtype=torch.float64) - 0.5
-    found = f1.locate(points, rotation)
-    assert found.shape == (5, 2, 3 + 36 + 9) and f1.latent_size == 12
+    found = f1.encode(points, rotation)
+    assert found.shape == (5, 2, 3 + 36) and f1.latent_size == 12
     in_camera = torch.einsum("vji,pj->pvi", rotation, points)
     phases = 1.5 * 2.0 ** torch.arange(6, dtype=torch.float64)[:, None] * in_camera[:, :, None]
     expected = torch.cat((torch.sin(phases), torch.cos(phases)), dim=-1).flatten(-2)
     torch.testing.assert_close(found[..., :3], in_camera)
-    torch.testing.assert_close(found[..., 3:39], expected)
+    torch.testing.assert_close(found[..., 3:], expected)
     assert f1.from_points.in_features == 39 + 3
 
 
@@ -63,30 +51,32 @@ def test_whether_turning_the_world_changes_anything(name, num_blocks):
     f1 = tiny_models.shake(tiny_models.f1(name, num_point_features=2, num_blocks=num_blocks).double())
     points, turn, rotations = torch.rand(6, 3, dtype=torch.float64) - 0.5, axes(1)[0], axes(3)
     dirs = safe_normalize(torch.randn(6, 3, dtype=torch.float64))
-    before = inputs_of(f1, points, dirs, rotations, point_features=2)
-    after = inputs_of(f1, points @ turn.T, dirs @ turn.T, turn @ rotations, point_features=2)
-    difference = (f1(before, before.view_dirs) - f1(after, after.view_dirs)).abs().amax()
+    features = torch.randn(6, 3, 2, dtype=torch.float64)
+    before, after = inputs_of(f1, points, rotations), inputs_of(f1, points @ turn.T, turn @ rotations)
+    difference = (f1(before, features, dirs) - f1(after, features, dirs @ turn.T)).abs().amax()
     assert (difference < 1e-9) == (name == "camera")
-    other = f1(before, -before.view_dirs)
-    assert other.shape == (6, 3, WIDTH) and (other - f1(before, before.view_dirs)).abs().amax() > 1e-3
+    other = f1(before, features, -dirs)
+    assert other.shape == (6, 3, WIDTH) and (other - f1(before, features, dirs)).abs().amax() > 1e-3
 
 
 @pytest.mark.parametrize("name", ["world", "camera"])
 def test_no_direction_is_one_row_for_all(name):
     f1 = tiny_models.shake(tiny_models.f1(name).double())
-    inputs = inputs_of(f1, torch.rand(4, 3, dtype=torch.float64), torch.zeros(4, 3).double(), axes(2))
-    torch.testing.assert_close(f1(inputs, inputs.view_dirs), f1(inputs, inputs.view_dirs[:1]))
+    inputs = inputs_of(f1, torch.rand(4, 3, dtype=torch.float64), axes(2))
+    no_dirs, no_features = torch.zeros(4, 3).double(), torch.zeros(4, 2, 0).double()
+    torch.testing.assert_close(f1(inputs, no_features, no_dirs), f1(inputs, no_features, no_dirs[:1]))
 
 
 def test_features_enter_before_every_block():
     """Changing only what the last block reads changes the answer."""
     f1 = tiny_models.shake(tiny_models.f1("camera", num_blocks=3).double())
-    inputs = inputs_of(f1, torch.rand(4, 3, dtype=torch.float64), torch.zeros(4, 3).double(), axes(2))
+    inputs = inputs_of(f1, torch.rand(4, 3, dtype=torch.float64), axes(2))
+    no_dirs, no_features = torch.zeros(4, 3).double(), torch.zeros(4, 2, 0).double()
     for block in range(3):
         changed = inputs.latents.clone()
         changed[..., block * WIDTH : (block + 1) * WIDTH] += 1.0
-        answer = f1(replace(inputs, latents=changed), inputs.view_dirs)
-        assert (answer - f1(inputs, inputs.view_dirs)).abs().amax() > 1e-2
+        answer = f1(replace(inputs, latents=changed), no_features, no_dirs)
+        assert (answer - f1(inputs, no_features, no_dirs)).abs().amax() > 1e-2
 
 
 @pytest.mark.parametrize("density", tiny_models.DENSITIES)

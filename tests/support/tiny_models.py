@@ -123,6 +123,7 @@ def tiny_model(
 
     def field() -> Field:
         return Field(
+            features=inputs,
             single_view=f1(
                 single_view, num_point_features=inputs.num_point_features, num_blocks=num_blocks, width=width
             ),
@@ -138,7 +139,6 @@ def tiny_model(
     return CharNeRF(
         encoder=encoder,
         views={"turnaround": Turnaround, "mirrored": MirroredSide}[views](),
-        features=inputs,
         coarse=field(),
         fine=field() if fine else None,
         box_centre=[0.0, 0.0, 1.0],

@@ -21,10 +21,9 @@ from charnerf.geometry.cross_sections import CrossSections, cross_sections, read
 from charnerf.geometry.hull import hull_contains
 from charnerf.geometry.rays import box_interval, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, importance_t_vals, merge_t_vals, stratified_t_vals
-from charnerf.models.charnerf import HULL_DEPTH_FADE, CharNeRF, EncodedViews
-from charnerf.models.features.base import ViewReadings
+from charnerf.models.charnerf import CharNeRF, EncodedViews
 from charnerf.models.field import Field
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import FieldInputs, PointViews
 from charnerf.models.view_maps import kept_share, widened_coverage
 from charnerf.pictures import images_on_white
 from charnerf.types import FieldOutput, Hull, RayBundle, RenderOutput, SourceViews
@@ -91,8 +90,7 @@ class PixelNeRFLike:
         edges = edges_from_t_vals(coarse, near, far)
         drawn = importance_t_vals(edges, weights.detach(), self.num_fine, generator)
         t_vals = merge_t_vals(coarse, drawn)
-        fine = self.network.coarse if self.network.fine is None else self.network.fine
-        answer = self._ask(fine, maps, rays, t_vals)
+        answer = self._ask(self.network.finest, maps, rays, t_vals)
         widths = edges_from_t_vals(t_vals, near, far).diff(dim=-1)
         weights, _ = weights_from_densities(answer.densities, widths)
         return RenderOutput(
@@ -124,43 +122,34 @@ class PixelNeRFLike:
         size = pixels.new_tensor((cameras.width, cameras.height))
         valid = (in_front & (pixels >= 0).all(-1) & (pixels <= size).all(-1)).T
         latents = field.from_latents(_read(maps.feature_maps, pixels / size)) * valid[..., None]
-        source_rgb = _read(maps.pictures, pixels / size)
         kept = self._kept(maps, pixels / size)
         behind, edge = self._read_hull(maps, pixels / size, depth.T, points)
-        source_dirs = directions_to_points(cameras, points)
         places, half_lengths = self._read_sections(maps, points)
-        readings = ViewReadings(
-            source_rgb=source_rgb,
-            behind=behind,
-            edge=edge,
-            source_dirs=source_dirs,
-            mirrored=maps.views.mirrored.to(points.dtype),
-            places=places,
-            half_lengths=half_lengths / network.box_half_extent,
-        )
-        encoded = field.single_view.locate(
-            (points - network.box_centre) / network.box_half_extent, cameras.world_from_camera[:, :3, :3]
-        )
-        return field(
-            PointInputs(
-                latents=latents,
-                point_features=network.features(readings),
-                source_rgb=source_rgb,
+        inputs = FieldInputs(
+            views=PointViews(
+                rgb=_read(maps.pictures, pixels / size),
                 uv=(pixels / size).transpose(0, 1),
-                visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
+                dirs=directions_to_points(cameras, points),
+                behind=behind,
                 valid=valid,
-                encoded_points=encoded,
-                view_dirs=view_dirs,
-                source_dirs=source_dirs,
-                kept=kept,
-            )
+            ),
+            latents=latents,
+            edge=edge,
+            mirrored=maps.views.mirrored.to(points.dtype),
+            section_places=places,
+            section_lengths=half_lengths / network.box_half_extent,
+            box_points=(points - network.box_centre) / network.box_half_extent,
+            rotations=cameras.world_from_camera[:, :3, :3],
+            kept=kept,
         )
+        answer: FieldOutput = field(inputs, view_dirs)
+        return answer
 
-    def _kept(self, maps: PixelAligned, shares: Tensor) -> Tensor:
+    def _kept(self, maps: PixelAligned, uv: Tensor) -> Tensor:
         """As the model: which share of the densities (P,) the drawings leave."""
         if maps.coverage is None or self.network.training:
-            return torch.ones_like(shares[0, :, 0])
-        return kept_share(_read(maps.coverage, shares[maps.carving])[..., 0])
+            return torch.ones_like(uv[0, :, 0])
+        return kept_share(_read(maps.coverage, uv[maps.carving])[..., 0])
 
     def _read_sections(self, maps: PixelAligned, points: Tensor) -> tuple[Tensor, Tensor]:
         if maps.sections is None:
@@ -169,21 +158,21 @@ class PixelNeRFLike:
         return read_cross_sections(maps.sections, points)
 
     def _read_hull(
-        self, maps: PixelAligned, shares: Tensor, depth: Tensor, points: Tensor
+        self, maps: PixelAligned, uv: Tensor, depth: Tensor, points: Tensor
     ) -> tuple[Tensor, Tensor]:
         """As the model reads it: distance behind the hull's front and from the mask's edge, (P, V) each."""
         if maps.hull_maps is None:
             return torch.zeros_like(depth), torch.zeros_like(depth)
-        front, edge = _read(maps.hull_maps, shares).unbind(-1)
+        front, edge = _read(maps.hull_maps, uv).unbind(-1)
         cameras = maps.views.cameras
         distance = (points[:, None] - cameras.world_from_camera[:, :3, 3]).norm(dim=-1)
         along = torch.where(cameras.orthographic, depth, distance)
         return (along - front) / self.network.box_half_extent, edge / cameras.width
 
 
-def _read(maps: Tensor, shares: Tensor) -> Tensor:
-    """Bilinear readings (P, V, C) of maps (V, C, h, w) at shares (V, P, 2) of the picture's sides."""
-    grid = (2.0 * shares - 1.0)[:, :, None]
+def _read(maps: Tensor, uv: Tensor) -> Tensor:
+    """Bilinear readings (P, V, C) of maps (V, C, h, w) at uv (V, P, 2), by the picture's sides."""
+    grid = (2.0 * uv - 1.0)[:, :, None]
     read = F.grid_sample(maps, grid, mode="bilinear", padding_mode="border", align_corners=False)
     return (
         read[..., 0].permute(2, 0, 1).contiguous()

@@ -82,7 +82,7 @@ def view_attention_of(network: CharNeRF) -> ViewAttention:
     Raises:
         ConfigError: If it is another one.
     """
-    combinator = (network.fine or network.coarse).combinator
+    combinator = network.finest.combinator
     if not isinstance(combinator, ViewAttention):
         raise ConfigError(
             f"combinator: found {type(combinator).__name__}, expected view_mha: only its dot products have a view part."

@@ -20,11 +20,12 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.errors import DataError
-from charnerf.finetuning.known import finest, render_known
-from charnerf.finetuning.material import Material, Targets, gather, render_all
+from charnerf.finetuning.cached_rays import render_cached
+from charnerf.finetuning.ray_sets import RaySets, Targets, prepare_rays, render_all
 from charnerf.finetuning.recipe import Recipe
 from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
+from charnerf.models.character import CharacterField
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import LeftOut
 
@@ -70,7 +71,7 @@ class Finetuned:
         curve: Error against seconds.
         best: The point of the curve whose weights were kept; the first one if none were.
         left_out: Rays that miss the hull and samples outside it, which were not looked at.
-        num_encodings: Encoder passes left out: one was made, one a step would be made without what is known.
+        num_encodings: Encoder passes left out: one was made, one a step would be made without what is cached.
         num_samples: Samples whose f1 was computed once.
         num_answers: How often samples were answered, each without f1.
         seconds: By stage.
@@ -114,14 +115,15 @@ def finetune(
         hull = hero.scene.bounds.hull
         encoded = network.encode(hero.views, None if hull is None else hull[None], detailed=hero.detailed)
         scene = network.scene(encoded, 0)
-        material = gather(network, model.renderer, encoded, scene, hero.views, hero.radius(), recipe)
-    if not len(material.learnt) or not len(material.held_out):
+        assert isinstance(scene.field, CharacterField)  # a network makes no other
+        sets = prepare_rays(scene.field, model.renderer, scene, hero.views, hero.radius(), recipe)
+    if not len(sets.learnt) or not len(sets.held_out):
         raise DataError(
-            f"drawings: found {len(material.learnt)} rays to learn from and {len(material.held_out)} held "
+            f"drawings: found {len(sets.learnt)} rays to learn from and {len(sets.held_out)} held "
             "out, expected some of each. Check the drawings' masks."
         )
     prepared = time.perf_counter()
-    run = _Run(network, model.renderer, material, recipe, start)
+    run = _Run(network, model.renderer, sets, recipe, start)
     best = run.learn(on_progress)
     kept = best.step > 0
     adapted = replace(model, network=network) if kept else model
@@ -134,9 +136,9 @@ def finetune(
         reason=_reason(run.curve, best, recipe),
         curve=tuple(run.curve),
         best=best,
-        left_out=material.left_out,
+        left_out=sets.left_out,
         num_encodings=run.curve[-1].step,
-        num_samples=sum(len(one.known.rows.view_features) for one in run.parts),
+        num_samples=sum(len(one.cached.rows.view_features) for one in run.targets),
         num_answers=run.num_answers,
         seconds={"prepare": prepared - start, "learn": time.perf_counter() - prepared},
     )
@@ -144,8 +146,7 @@ def finetune(
 
 def learning_parts(network: CharNeRF) -> nn.ModuleList:
     """The parts that learn: the finest field's combinator, f2, density and head."""
-    field = finest(network)
-    return nn.ModuleList([getattr(field, name) for name in LEARNING])
+    return nn.ModuleList([getattr(network.finest, name) for name in LEARNING])
 
 
 class _Run:
@@ -155,11 +156,11 @@ class _Run:
         self,
         network: CharNeRF,
         renderer: AbstractRenderer,
-        material: Material,
+        sets: RaySets,
         recipe: Recipe,
         start: float,
     ) -> None:
-        self.network, self.renderer, self.material, self.recipe = network, renderer, material, recipe
+        self.network, self.renderer, self.sets, self.recipe = network, renderer, sets, recipe
         self.start = start
         self.learning = learning_parts(network)
         self.generator = torch.Generator().manual_seed(recipe.seed)
@@ -167,10 +168,10 @@ class _Run:
         self.num_answers = 0
 
     @property
-    def parts(self) -> tuple[Targets, ...]:
-        """All rays that are known."""
-        one = self.material
-        return one.learnt, one.held_out, one.trusted, one.guard
+    def targets(self) -> tuple[Targets, ...]:
+        """All rays that are cached."""
+        sets = self.sets
+        return sets.learnt, sets.held_out, sets.trusted, sets.guard
 
     def learn(self, on_progress: Callable[[float, CurvePoint], object]) -> CurvePoint:
         """Learn until time, steps or patience are over; leave the network with the best weights."""
@@ -218,17 +219,17 @@ class _Run:
 
     def _loss(self) -> tuple[Tensor, float]:
         """Loss of a step, and its part on the drawings' rays."""
-        learnt = self._error(self.material.learnt, self.recipe.rays)
+        learnt = self._error(self.sets.learnt, self.recipe.rays)
         loss = learnt
-        if self.recipe.trust > 0 and len(self.material.trusted):
-            loss = loss + self.recipe.trust * self._error(self.material.trusted, self.recipe.novel_rays)
+        if self.recipe.trust > 0 and len(self.sets.trusted):
+            loss = loss + self.recipe.trust * self._error(self.sets.trusted, self.recipe.novel_rays)
         return loss, float(learnt.detach())
 
     def _error(self, targets: Targets, count: int) -> Tensor:
         """Mean error of some rays, each with its weight."""
         index = torch.randint(len(targets), (count,), generator=self.generator).to(targets.alpha.device)
-        rgb, opacity = render_known(finest(self.network), self.renderer, targets.known, index)
-        self.num_answers += int(targets.known.placed.inside[index].sum())
+        rgb, opacity = render_cached(self.network.finest, self.renderer, targets.cached, index)
+        self.num_answers += int(targets.cached.placed.inside[index].sum())
         errors = self._errors(rgb, opacity, targets.rgb[index], targets.alpha[index])
         return (targets.weights[index] * errors).mean()
 
@@ -239,10 +240,10 @@ class _Run:
     @torch.no_grad()
     def _look(self, step: int, learnt: float) -> CurvePoint:
         """Measure held-out patches and novel views, and note it."""
-        held, guard = self.material.held_out, self.material.guard
-        rgb, opacity = render_all(self.network, self.renderer, held.known)
-        there, _ = render_all(self.network, self.renderer, guard.known)
-        self.num_answers += len(held.known.rows.view_features) + len(guard.known.rows.view_features)
+        held, guard = self.sets.held_out, self.sets.guard
+        rgb, opacity = render_all(self.network.finest, self.renderer, held.cached)
+        there, _ = render_all(self.network.finest, self.renderer, guard.cached)
+        self.num_answers += len(held.cached.rows.view_features) + len(guard.cached.rows.view_features)
         point = CurvePoint(
             step=step,
             seconds=time.perf_counter() - self.start,

@@ -43,6 +43,7 @@ def build_model(cfg: DictConfig) -> CharNeRF:
 
     def build_field() -> Field:
         return Field(
+            features=features,
             single_view=build_part(
                 cfg.single_view,
                 {
@@ -64,7 +65,6 @@ def build_model(cfg: DictConfig) -> CharNeRF:
     return CharNeRF(
         encoder=encoder,
         views=build_part(cfg.views),
-        features=features,
         coarse=build_field(),
         fine=build_field() if cfg.renderer.num_fine > 0 else None,
         box_centre=list(settings.box_centre),

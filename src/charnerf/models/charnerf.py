@@ -1,6 +1,6 @@
 """The model: drawings -> encoder -> feature maps -> scenes that answer points with colour and density."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import torch
@@ -10,19 +10,15 @@ from charnerf.errors import ShapeError
 from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.hull import build_hull
 from charnerf.geometry.resizing import resized_views
+from charnerf.models.character import CharacterField
 from charnerf.models.encoders.base import AbstractEncoder
-from charnerf.models.features.base import AbstractFeatures, ViewReadings
-from charnerf.models.field import Field, PendingColors
-from charnerf.models.inputs import PointInputs
+from charnerf.models.field import Field
 from charnerf.models.lookup import maps_to_rows
-from charnerf.models.view_maps import Pictures, ViewMaps, kept_share
+from charnerf.models.view_maps import ViewMaps
 from charnerf.models.views.base import AbstractViews
 from charnerf.pictures import images_on_white
-from charnerf.scene import AbstractField, DensityOutput, Scene
-from charnerf.types import FieldOutput, Hull, SourceViews, TensorRecord
-
-BYTES_PER_FEATURE = 64  # of a view and a point, gradient kept: some 16 tensors of float32; measured, generous
-HULL_DEPTH_FADE = 20.0  # per half-extent: a point this share behind the hull's front counts as hidden by 1/e
+from charnerf.scene import Scene
+from charnerf.types import Hull, SourceViews, TensorRecord
 
 
 @dataclass(frozen=True)
@@ -51,7 +47,6 @@ class CharNeRF(nn.Module):
     Args:
         encoder: E.
         views: Which views are used.
-        features: Further inputs of f1.
         coarse: The field of the coarse pass.
         fine: The field of the fine pass, or None where the configuration has none.
         box_centre: Centre of the space looked at, m, 3 numbers.
@@ -70,7 +65,6 @@ class CharNeRF(nn.Module):
         *,
         encoder: AbstractEncoder,
         views: AbstractViews,
-        features: AbstractFeatures,
         coarse: Field,
         fine: Field | None,
         box_centre: list[float],
@@ -81,7 +75,6 @@ class CharNeRF(nn.Module):
         super().__init__()
         self.encoder = encoder
         self.views = views
-        self.features = features
         self.coarse = coarse
         self.fine = fine
         self.box_half_extent = float(box_half_extent)
@@ -93,6 +86,11 @@ class CharNeRF(nn.Module):
     def device(self) -> torch.device:
         """Where the networks are."""
         return self.box_centre.device
+
+    @property
+    def finest(self) -> Field:
+        """The field that pictures and meshes are made of."""
+        return self.coarse if self.fine is None else self.fine
 
     @property
     def box(self) -> tuple[Tensor, Tensor]:
@@ -171,126 +169,26 @@ class CharNeRF(nn.Module):
         views = views[present]
         hull = encoded.hull[index] if encoded.hull is not None else None
         maps = encoded.feature_maps[index][present]
+        view_maps = ViewMaps.of(
+            views,
+            hull,
+            present,
+            map_size=(maps.shape[-1], maps.shape[-2]),
+            box_centre=self.box_centre,
+            box_half_extent=self.box_half_extent,
+            sections=self.coarse.features.reads_sections,
+            # in training the field learns the outlines by itself: with them it came to 0.2 dB less foreground (docs/results.md)
+            coverage=hull is not None and not self.training,
+        )
         rows = maps_to_rows(maps)
-        view_maps = self.view_maps(views, hull, present, maps)
         detailed = None if encoded.detailed is None else encoded.detailed[index][present]
 
-        def answering(field: Field) -> CharacterField:
-            mirrored = views.mirrored.to(maps.dtype)
-            return CharacterField(self, field, view_maps, field.hoist(rows), mirrored, detailed)
+        def reading(field: Field) -> CharacterField:
+            return CharacterField(field, view_maps, field.hoist(rows), detailed)
 
-        coarse, fine = answering(self.coarse), None if self.fine is None else answering(self.fine)
-        outlines = None if view_maps.shown is None else view_maps.in_outlines
-        return Scene(coarse, fine, Bounds(*self.box, hull, outlines)).at_width(encoded.width)
-
-    def view_maps(self, views: SourceViews, hull: Hull | None, present: Tensor, maps: Tensor) -> ViewMaps:
-        """What present views (V,) of a character show, for `point_inputs`; maps (V, F, h, w)."""
-        size = (maps.shape[-1], maps.shape[-2])
-        # in training the field learns the outlines by itself: with them it came to 0.2 dB less foreground (docs/results.md)
-        outlines = hull is not None and not self.training
-        return ViewMaps.of(
-            views, hull, present, size, sections=self.features.reads_sections, coverage=outlines
+        scene = Scene(
+            coarse=reading(self.coarse),
+            fine=None if self.fine is None else reading(self.fine),
+            bounds=Bounds(*self.box, hull, None if view_maps.shown is None else view_maps.in_outlines),
         )
-
-    def point_inputs(
-        self, points: Tensor, view_dirs: Tensor, *, maps: ViewMaps, latents: Tensor, mirrored: Tensor
-    ) -> PointInputs:
-        """What a field sees of points (P, 3) looked at along view_dirs (P, 3)."""
-        sight = maps.look(points, latents)
-        if sight.front is None or sight.edge is None:
-            behind = edge = torch.zeros_like(sight.along_ray)
-        else:
-            behind = (sight.along_ray - sight.front) / self.box_half_extent
-            edge = sight.edge / maps.cameras.width
-        if sight.coverage is None:
-            kept = torch.ones_like(points[:, 0])
-        else:
-            kept = kept_share(sight.coverage[:, maps.carving])
-        places, half_lengths = maps.places(points)
-        readings = ViewReadings(
-            source_rgb=sight.rgb,
-            behind=behind,
-            edge=edge,
-            source_dirs=sight.source_dirs,
-            mirrored=mirrored,
-            places=places,
-            half_lengths=half_lengths / self.box_half_extent,
-        )
-        return PointInputs(
-            latents=sight.latents,
-            point_features=self.features(readings),
-            source_rgb=sight.rgb,
-            uv=sight.uv,
-            visibility=torch.exp(-HULL_DEPTH_FADE * behind.clamp_min(0.0)),
-            valid=sight.valid,
-            encoded_points=self.coarse.single_view.locate(
-                (points - self.box_centre) / self.box_half_extent,
-                maps.cameras.world_from_camera[:, :3, :3],
-            ),
-            view_dirs=view_dirs,
-            source_dirs=sight.source_dirs,
-            kept=kept,
-        )
-
-
-@final
-@dataclass(frozen=True)
-class CharacterField(AbstractField):
-    """One of the model's fields for one character.
-
-    Attributes:
-        network: The model.
-        field: Its coarse or fine field.
-        maps: What the character's views show.
-        latents: Rows of the feature maps, through the field's linear layer.
-        mirrored: (V,), 1 where a view is mirrored.
-        detailed: The views with more pixels, (V, 3, H, W), or None.
-        pictures: What colours are read from instead of `maps`, or None.
-    """
-
-    network: CharNeRF
-    field: Field
-    maps: ViewMaps
-    latents: Tensor
-    mirrored: Tensor
-    detailed: Tensor | None
-    pictures: Pictures | None = None
-
-    @property
-    def sees_directions(self) -> bool:
-        """Whether densities depend on the query direction."""
-        return self.field.density.sees_directions
-
-    @property
-    def bytes_per_point(self) -> int:
-        """By the number of views and the features' width."""
-        return BYTES_PER_FEATURE * len(self.mirrored) * self.field.from_latents.out_features
-
-    def __call__(self, points: Tensor, view_dirs: Tensor) -> FieldOutput:
-        """Colours (P, 3) and densities (P,)."""
-        return self.field(self._colored(self._inputs(points, view_dirs)))
-
-    def densities(self, points: Tensor, view_dirs: Tensor) -> DensityOutput:
-        """Densities (P,); colours are read and made when they are asked for."""
-        return self.field.densities(self._inputs(points, view_dirs))
-
-    def colors(self, state: PendingColors) -> Tensor:
-        """Colours (Q, 3)."""
-        return self.field.colors(state.trunk, self._colored(state.inputs))
-
-    def at_width(self, width: int) -> "CharacterField":
-        """Colours from the detailed drawings, so many pixels wide; from the encoded ones where those are as wide."""
-        if self.detailed is None:
-            return self
-        pictures = Pictures.of(self.detailed, width) if width > self.maps.cameras.width else None
-        return replace(self, pictures=pictures)
-
-    def _inputs(self, points: Tensor, view_dirs: Tensor) -> PointInputs:
-        return self.network.point_inputs(
-            points, view_dirs, maps=self.maps, latents=self.latents, mirrored=self.mirrored
-        )
-
-    def _colored(self, inputs: PointInputs) -> PointInputs:
-        if self.pictures is None:
-            return inputs
-        return replace(inputs, source_rgb=self.pictures.read(inputs.uv))
+        return scene.at_width(encoded.width)

@@ -10,7 +10,7 @@ from charnerf.errors import ShapeError
 from charnerf.geometry.safe import safe_normalize
 from charnerf.models.charnerf import CharNeRF
 from charnerf.models.field import Field
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import FieldInputs, PointViews
 
 FIELDS = ("coarse.", "fine.")
 NUM_POINTS, NUM_VIEWS = 64, 4  # at which two fields are compared
@@ -41,7 +41,7 @@ def grow_from(model: CharNeRF, smaller: CharNeRF) -> None:
     for name, value in old.items():
         _place(fresh[name], value, name)  # the tensors of a state are those of the model
     for mine, its in ((model.coarse, smaller.coarse), (model.fine, smaller.fine)):
-        if mine is not None and its is not None and not _answer_alike(mine, its, model):
+        if mine is not None and its is not None and not _answer_alike(mine, its):
             raise ShapeError("found parts that answer otherwise once they are larger, such as attention.")
 
 
@@ -57,12 +57,12 @@ def _place(fresh: Tensor, old: Tensor, name: str) -> None:
     fresh[tuple(slice(size) for size in old.shape)] = old
 
 
-def _answer_alike(first: Field, second: Field, model: CharNeRF) -> bool:
+def _answer_alike(first: Field, second: Field) -> bool:
     """Whether two fields answer seeded random inputs with the same colours and densities."""
     answers = []
     for field in (first, second):
         with torch.no_grad():
-            answers.append(field(_random_inputs(field, model)))
+            answers.append(field(*_random_inputs(field)))
     mine, its = answers
     return all(
         torch.allclose(a, b, rtol=ROUNDING, atol=ROUNDING)
@@ -70,7 +70,7 @@ def _answer_alike(first: Field, second: Field, model: CharNeRF) -> bool:
     )
 
 
-def _random_inputs(field: Field, model: CharNeRF) -> PointInputs:
+def _random_inputs(field: Field) -> tuple[FieldInputs, Tensor]:
     generator = torch.Generator().manual_seed(0)
 
     def normal(*shape: int) -> Tensor:
@@ -79,18 +79,26 @@ def _random_inputs(field: Field, model: CharNeRF) -> PointInputs:
     def unit(*shape: int) -> Tensor:
         return safe_normalize(normal(*shape))
 
-    rows = normal(NUM_POINTS * NUM_VIEWS, field.from_latents.in_features)
-    rotations = torch.eye(3).expand(NUM_VIEWS, 3, 3)
-    visibility = torch.rand(NUM_POINTS, NUM_VIEWS, generator=generator)
-    return PointInputs(
-        latents=field.hoist(rows).view(NUM_POINTS, NUM_VIEWS, -1),
-        point_features=normal(NUM_POINTS, NUM_VIEWS, model.features.num_point_features),
-        source_rgb=torch.rand(NUM_POINTS, NUM_VIEWS, 3, generator=generator),
-        uv=torch.rand(NUM_POINTS, NUM_VIEWS, 2, generator=generator),
-        visibility=visibility,
-        valid=visibility > 0.2,
-        encoded_points=field.single_view.locate(unit(NUM_POINTS, 3), rotations),
-        view_dirs=unit(NUM_POINTS, 3),
-        source_dirs=unit(NUM_POINTS, NUM_VIEWS, 3),
-        kept=torch.ones(NUM_POINTS),
+    def share(*shape: int) -> Tensor:
+        return torch.rand(*shape, generator=generator)
+
+    points, views = NUM_POINTS, NUM_VIEWS
+    rows = normal(points * views, field.from_latents.in_features)
+    inputs = FieldInputs(
+        views=PointViews(
+            rgb=share(points, views, 3),
+            uv=share(points, views, 2),
+            dirs=unit(points, views, 3),
+            behind=0.1 * normal(points, views),
+            valid=share(points, views) > 0.2,
+        ),
+        latents=field.hoist(rows).view(points, views, -1),
+        edge=0.1 * normal(points, views),
+        mirrored=torch.zeros(views),
+        section_places=normal(points, 3),
+        section_lengths=share(points, 3),
+        box_points=unit(points, 3),
+        rotations=torch.eye(3).expand(views, 3, 3),
+        kept=torch.ones(points),
     )
+    return inputs, unit(points, 3)

@@ -1,8 +1,7 @@
 """All that a character's views show, prepared once as rows, and read at points.
 
-Letters: P points, V views, C channels. Everything that does not depend on the point (camera matrices,
-drawings on white, maps of
-the hull) is computed here once a character instead of once a sample.
+Letters: P points, V views, L latents. Everything that does not depend on the point (camera matrices, drawings on white, maps
+of the hull) is computed here once a character instead of once a sample.
 """
 
 from dataclasses import dataclass
@@ -14,61 +13,40 @@ from torch.nn import functional as F
 from charnerf.geometry.cameras import directions_to_points, project_into_all
 from charnerf.geometry.cross_sections import CrossSections, cross_sections, read_cross_sections
 from charnerf.geometry.resizing import resized_pictures
+from charnerf.models.inputs import FieldInputs, PointViews
 from charnerf.models.lookup import bilinear_rows, first_pixels, maps_to_rows, read_rows
 from charnerf.pictures import images_on_white
 from charnerf.types import Cameras, Hull, SourceViews
 
 
 @dataclass(frozen=True)
-class Sight:
-    """Points (P) as the views (V) see them, without the encoder's features.
-
-    Attributes:
-        latents: (P, V, D), rows of the features read at the projections; 0 where not valid.
-        rgb: (P, V, 3), colour of the drawings.
-        uv: (P, V, 2), where they project, by the pictures' sides.
-        front: (P, V), m, distance of the hull's front along the view's ray.
-        edge: (P, V), pixels, distance from the mask's edge.
-        along_ray: (P, V), m, distance of the point along the view's ray.
-        source_dirs: (P, V, 3), unit.
-        valid: (P, V), bool.
-        coverage: (P, V), alpha of the drawings, as widened as their hull; 1 behind a camera. None where it is not read.
-    """
-
-    latents: Tensor
-    rgb: Tensor
-    uv: Tensor
-    front: Tensor | None
-    edge: Tensor | None
-    along_ray: Tensor
-    source_dirs: Tensor
-    valid: Tensor
-    coverage: Tensor | None
-
-
-@dataclass(frozen=True)
 class ViewMaps:
-    """Drawings and hull maps of one character as rows, with its cameras.
+    """Drawings and hull maps of one character as rows, with its cameras and the box that coordinates are scaled by.
 
     Attributes:
         cameras: (V,).
         parallel: Whether every camera is orthographic: no perspective division, one direction a view.
+        mirrored: (V,), 1 where the view is a mirrored one.
         map_size: Width and height of the feature maps.
+        box_centre: Centre of the space looked at, (3,), m.
+        box_half_extent: Half of its side, m.
         pictures: Rows (V * H * W, 3) of colour, then coverage where it is read, then the hull's maps where they have the pictures'
             size.
         carving: Indices of the views whose silhouettes carve: mirrored ones do not.
         shown: Whether the drawings that carve show anything at four pixels by their first one, (C, H - 1, W - 1) bool; None where
             coverage is not read.
-        hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None
-            without a hull or where
-            they lie beside the colours.
+        hull_rows: Rows (V * h * w, 2) of front depth and edge distance where they have another size; None without a hull or
+            where they lie beside the colours.
         hull_size: Width and height of the hull's maps; zeros without a hull.
         sections: The hull's cross-sections, None where the model does not read them.
     """
 
     cameras: Cameras
     parallel: bool
+    mirrored: Tensor
     map_size: tuple[int, int]
+    box_centre: Tensor
+    box_half_extent: float
     pictures: Tensor
     carving: Tensor
     shown: Tensor | None
@@ -82,8 +60,10 @@ class ViewMaps:
         views: SourceViews,
         hull: Hull | None,
         present: Tensor,
-        map_size: tuple[int, int],
         *,
+        map_size: tuple[int, int],
+        box_centre: Tensor,
+        box_half_extent: float,
         sections: bool,
         coverage: bool,
     ) -> "ViewMaps":
@@ -94,6 +74,8 @@ class ViewMaps:
             hull: The character's hull with maps of all views, or None.
             present: Indices of the views in the hull's maps, (V,).
             map_size: Width and height of the feature maps.
+            box_centre: Of the space looked at, (3,), m.
+            box_half_extent: Half of its side, m.
             sections: Whether to measure the hull's cross-sections.
             coverage: Whether to read the drawings' coverage, for `kept_share`.
         """
@@ -114,7 +96,10 @@ class ViewMaps:
         return cls(
             cameras=views.cameras,
             parallel=bool(views.cameras.orthographic.all()),
+            mirrored=views.mirrored.to(pictures.dtype),
             map_size=map_size,
+            box_centre=box_centre,
+            box_half_extent=box_half_extent,
             pictures=maps_to_rows(pictures),
             carving=carving,
             shown=shown,
@@ -123,8 +108,8 @@ class ViewMaps:
             sections=cross_sections(hull) if sections and hull is not None else None,
         )
 
-    def look(self, points: Tensor, latents: Tensor) -> Sight:
-        """Read features (rows (V * h * w, D)), drawings and hull maps at points (P, 3)."""
+    def read(self, points: Tensor, latents: Tensor) -> FieldInputs:
+        """Read features (rows (V * h * w, L)), drawings and hull maps at points (P, 3)."""
         cameras, leading = self.cameras, (points.shape[0], self.cameras.shape[0])
         pixels, depth, in_front = project_into_all(cameras, points)
         size = pixels.new_tensor((cameras.width, cameras.height))
@@ -132,22 +117,23 @@ class ViewMaps:
         scale = pixels.new_tensor(self.map_size) / size
         indices, weights = bilinear_rows(pixels * scale, width=self.map_size[0], height=self.map_size[1])
         read = read_rows(latents, indices, weights * valid.reshape(-1, 1))
-        seen = read_rows(
+        shown = read_rows(
             self.pictures, *bilinear_rows(pixels, width=cameras.width, height=cameras.height)
         ).unflatten(0, leading)
         uv = pixels / size
-        front, edge = self._hull_readings(uv, seen)
         directions, along_ray = self._directions(points, depth)
-        return Sight(
+        behind, edge = self._hull_readings(uv, shown, along_ray)
+        places, lengths = self._section_readings(points)
+        return FieldInputs(
+            views=PointViews(rgb=shown[..., :3], uv=uv, dirs=directions, behind=behind, valid=valid),
             latents=read.unflatten(0, leading),
-            rgb=seen[..., :3],
-            uv=uv,
-            front=front,
             edge=edge,
-            along_ray=along_ray,
-            source_dirs=directions,
-            valid=valid,
-            coverage=torch.where(in_front, seen[..., 3], 1.0) if self.shown is not None else None,
+            mirrored=self.mirrored,
+            section_places=places,
+            section_lengths=lengths,
+            box_points=(points - self.box_centre) / self.box_half_extent,
+            rotations=cameras.world_from_camera[:, :3, :3],
+            kept=self._kept(points, shown, in_front),
         )
 
     def in_outlines(self, points: Tensor) -> Tensor:
@@ -158,23 +144,33 @@ class ViewMaps:
         view = torch.arange(len(self.shown), device=points.device)
         return (self.shown[view, top, left] | ~in_front).all(-1)
 
-    def places(self, points: Tensor) -> tuple[Tensor, Tensor]:
+    def _kept(self, points: Tensor, shown: Tensor, in_front: Tensor) -> Tensor:
+        """How much of the densities (P,) the drawings' coverage leaves; it has no say behind a camera."""
+        if self.shown is None:
+            return torch.ones_like(points[:, 0])
+        coverage = torch.where(in_front, shown[..., 3], 1.0)
+        return kept_share(coverage[:, self.carving])
+
+    def _section_readings(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Places of points (P, 3) in the hull's runs and the runs' half-lengths, (P, 3) each; zeros if they are not read."""
         if self.sections is None:
             nothing = torch.zeros_like(points)
             return nothing, nothing
-        return read_cross_sections(self.sections, points)
+        places, half_lengths = read_cross_sections(self.sections, points)
+        return places, half_lengths / self.box_half_extent
 
-    def _hull_readings(self, uv: Tensor, seen: Tensor) -> tuple[Tensor | None, Tensor | None]:
-        """Front depths and edge distances (P, V) from readings beside the colours or from rows of their own."""
+    def _hull_readings(self, uv: Tensor, shown: Tensor, along_ray: Tensor) -> tuple[Tensor, Tensor]:
+        """Distances behind the hull's front and from the mask's edge (P, V), read beside the colours or from rows of their own."""
         if self.hull_size == (0, 0):
-            return None, None
+            nothing = torch.zeros_like(along_ray)
+            return nothing, nothing
         if self.hull_rows is None:
-            return seen[..., -2], seen[..., -1]
-        width, height = self.hull_size
-        own = bilinear_rows(uv * uv.new_tensor(self.hull_size), width=width, height=height)
-        front, edge = read_rows(self.hull_rows, *own).unflatten(0, seen.shape[:2]).unbind(-1)
-        return front, edge
+            front, edge = shown[..., -2], shown[..., -1]
+        else:
+            width, height = self.hull_size
+            own = bilinear_rows(uv * uv.new_tensor(self.hull_size), width=width, height=height)
+            front, edge = read_rows(self.hull_rows, *own).unflatten(0, shown.shape[:2]).unbind(-1)
+        return (along_ray - front) / self.box_half_extent, edge / self.cameras.width
 
     def _directions(self, points: Tensor, depth: Tensor) -> tuple[Tensor, Tensor]:
         """Unit directions (P, V, 3) from the cameras to points, and distances along their rays (P, V)."""

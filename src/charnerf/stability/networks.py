@@ -35,7 +35,7 @@ def combinators() -> dict[str, AbstractCombinator]:
     """One of each, seeded, the learned one away from its start."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
-        plain: dict[str, Any] = {"width": WIDTH, "num_heads": 4, "attention_width": None, "rate": 1.0}
+        plain: dict[str, Any] = {"width": WIDTH, "num_heads": 4, "attention_width": None, "lr_scale": 1.0}
         plain |= {"residual": False, "norm": True, "temperature": None}
         attention = plain | {"residual": True, "temperature": 4.0}
         built: dict[str, AbstractCombinator] = {

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
+from charnerf.models.inputs import PointViews
 from charnerf.types import TensorRecord
 
 
@@ -36,20 +37,14 @@ class AbstractDensity(nn.Module):
         return self.f1_sees_directions or self.combinator_sees_directions or self.f2_sees_directions
 
     def color_features(
-        self,
-        trunk: TrunkOutput,
-        view_dirs: Tensor,
-        source_dirs: Tensor,
-        valid: Tensor,
-        combinator: AbstractCombinator,
+        self, trunk: TrunkOutput, views: PointViews, view_dirs: Tensor, combinator: AbstractCombinator
     ) -> Tensor:
         """Features (P, D) for the colour head; those of the trunk, where they have the query direction in them.
 
         Args:
             trunk: What the stages made of points (P).
+            views: What the source views show of them.
             view_dirs: (P, 3).
-            source_dirs: (P, V, 3).
-            valid: (P, V).
             combinator: H.
         """
         return trunk.features

@@ -4,7 +4,8 @@ from typing import final
 
 from torch import Tensor
 
-from charnerf.models.features.base import AbstractFeatures, ViewReadings
+from charnerf.models.features.base import AbstractFeatures
+from charnerf.models.inputs import FieldInputs
 
 
 @final
@@ -14,6 +15,6 @@ class ImageFeatures(AbstractFeatures):
     num_point_features = 0
     reads_hull = False
 
-    def __call__(self, readings: ViewReadings) -> Tensor:
+    def __call__(self, inputs: FieldInputs) -> Tensor:
         """Return (P, V, 0)."""
-        return readings.source_rgb[..., :0]
+        return inputs.views.rgb[..., :0]

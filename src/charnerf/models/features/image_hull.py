@@ -5,7 +5,8 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.models.features.base import AbstractFeatures, ViewReadings
+from charnerf.models.features.base import AbstractFeatures
+from charnerf.models.inputs import FieldInputs
 
 DEPTH_SCALES = (4.0, 20.0, 80.0)  # per half-extent: a torso, an arm, a surface
 EDGE_SCALES = (8.0, 40.0, 160.0)  # per picture side
@@ -23,15 +24,15 @@ class ImageHullFeatures(AbstractFeatures):
     num_point_features = len(DEPTH_SCALES) + 2 * len(EDGE_SCALES) + 3 + 3 + 1
     reads_hull = True
 
-    def __call__(self, readings: ViewReadings) -> Tensor:
+    def __call__(self, inputs: FieldInputs) -> Tensor:
         """Return (P, V, 16)."""
-        depths = [torch.tanh(scale * readings.behind) for scale in DEPTH_SCALES]
-        edges = [torch.tanh(scale * readings.edge) for scale in EDGE_SCALES]
-        has_no_say = (readings.mirrored > 0) & (readings.mirrored == 0).any()
+        depths = [torch.tanh(scale * inputs.views.behind) for scale in DEPTH_SCALES]
+        edges = [torch.tanh(scale * inputs.edge) for scale in EDGE_SCALES]
+        has_no_say = (inputs.mirrored > 0) & (inputs.mirrored == 0).any()
         smallest = (
-            readings.edge.masked_fill(has_no_say, torch.inf).amin(-1, keepdim=True).expand_as(readings.edge)
+            inputs.edge.masked_fill(has_no_say, torch.inf).amin(-1, keepdim=True).expand_as(inputs.edge)
         )
         smallests = [torch.tanh(scale * smallest) for scale in EDGE_SCALES]
-        mirrored = readings.mirrored.expand_as(readings.behind)
+        mirrored = inputs.mirrored.expand_as(inputs.views.behind)
         scalars = torch.stack((*depths, *edges, *smallests, mirrored), dim=-1)
-        return torch.cat((scalars, 2.0 * readings.source_rgb - 1.0, readings.source_dirs), dim=-1)
+        return torch.cat((scalars, 2.0 * inputs.views.rgb - 1.0, inputs.views.dirs), dim=-1)

@@ -5,8 +5,9 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.models.features.base import AbstractFeatures, ViewReadings
+from charnerf.models.features.base import AbstractFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
+from charnerf.models.inputs import FieldInputs
 
 LENGTH_SCALE = 1.0 / 18.0  # of the box's half-extent: half of an arm's thickness, 0.1 m of 1.8
 LEAST_LENGTH = 0.01 * LENGTH_SCALE
@@ -27,11 +28,11 @@ class ImageHullSectionFeatures(AbstractFeatures):
     def __init__(self) -> None:
         self.image_hull = ImageHullFeatures()
 
-    def __call__(self, readings: ViewReadings) -> Tensor:
+    def __call__(self, inputs: FieldInputs) -> Tensor:
         """Return (P, V, 28)."""
-        places, halves = readings.places, readings.half_lengths
+        places, halves = inputs.section_places, inputs.section_lengths
         squares = places.square()
         lengths = (torch.log2(halves.clamp_min(LEAST_LENGTH) / LENGTH_SCALE) / 3.0).clamp(-1.0, 1.0)
         section = torch.cat((places, squares, squares + squares.roll(1, dims=-1), lengths), dim=-1)
-        by_view = self.image_hull(readings)
+        by_view = self.image_hull(inputs)
         return torch.cat((by_view, section[:, None].expand(-1, by_view.shape[1], -1)), dim=-1)

@@ -6,8 +6,9 @@ from typing import final
 import torch
 from torch import Tensor
 
-from charnerf.models.features.base import AbstractFeatures, ViewReadings
+from charnerf.models.features.base import AbstractFeatures
 from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
+from charnerf.models.inputs import FieldInputs
 
 
 @final
@@ -26,9 +27,9 @@ class ImageHullSectionConsistencyFeatures(AbstractFeatures):
     def __init__(self) -> None:
         self.image_hull_section = ImageHullSectionFeatures()
 
-    def __call__(self, readings: ViewReadings) -> Tensor:
+    def __call__(self, inputs: FieldInputs) -> Tensor:
         """Return (P, V, 36)."""
-        return torch.cat((self.image_hull_section(readings), consistency(readings.source_rgb)), dim=-1)
+        return torch.cat((self.image_hull_section(inputs), consistency(inputs.views.rgb)), dim=-1)
 
 
 def consistency(rgb: Tensor) -> Tensor:

@@ -9,7 +9,7 @@ from torch.nn import functional as F
 from charnerf.models.combinators.base import masked_logits
 from charnerf.models.fused import score_rows
 from charnerf.models.heads.base import AbstractHead
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import PointViews
 
 
 @final
@@ -31,10 +31,13 @@ class BlendHead(AbstractHead):
         with torch.no_grad():
             self.free.bias[3] = -2.0  # the gate starts nearly closed: colours come from the drawings
 
-    def forward(self, features: Tensor, view_features: Tensor, inputs: PointInputs) -> Tensor:
+    def forward(
+        self, features: Tensor, view_features: Tensor, views: PointViews, view_dirs: Tensor
+    ) -> Tensor:
         """Colours (P, 3)."""
-        cosines = (inputs.view_dirs[:, None] * inputs.source_dirs).sum(-1, keepdim=True)
-        readings = torch.cat((cosines, inputs.visibility[..., None], inputs.source_rgb), dim=-1)
+        visibility = views.visibility
+        cosines = (view_dirs[:, None] * views.dirs).sum(-1, keepdim=True)
+        readings = torch.cat((cosines, visibility[..., None], views.rgb), dim=-1)
         addend = self.from_readings(readings) + self.from_features(features)[:, None]
         scores = score_rows(
             view_features.reshape(-1, view_features.shape[-1]),
@@ -44,8 +47,8 @@ class BlendHead(AbstractHead):
             self.score.weight,
             self.score.bias,
         )
-        logits = scores.view(inputs.valid.shape) + 2.0 * inputs.visibility
-        weights = torch.softmax(masked_logits(logits, inputs.valid), dim=-1)
-        blended = (weights[..., None] * inputs.source_rgb).sum(1)
+        logits = scores.view(views.valid.shape) + 2.0 * visibility
+        weights = torch.softmax(masked_logits(logits, views.valid), dim=-1)
+        blended = (weights[..., None] * views.rgb).sum(1)
         free = self.free(F.relu(features))
         return blended + torch.sigmoid(free[:, 3:]) * (torch.sigmoid(free[:, :3]) - blended)

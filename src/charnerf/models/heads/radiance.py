@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from charnerf.models.heads.base import AbstractHead
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import PointViews
 
 
 @final
@@ -22,6 +22,8 @@ class RadianceHead(AbstractHead):
         super().__init__()
         self.rgb = nn.Linear(width, 3)
 
-    def forward(self, features: Tensor, view_features: Tensor, inputs: PointInputs) -> Tensor:
+    def forward(
+        self, features: Tensor, view_features: Tensor, views: PointViews, view_dirs: Tensor
+    ) -> Tensor:
         """Colours (P, 3) from features (P, D)."""
         return torch.sigmoid(self.rgb(F.relu(features)))

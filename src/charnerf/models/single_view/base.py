@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 
 from torch import Tensor, nn
 
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import FieldInputs
 
 
 class AbstractSingleView(nn.Module, ABC):
@@ -17,17 +17,11 @@ class AbstractSingleView(nn.Module, ABC):
     latent_size: int
 
     @abstractmethod
-    def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
-        """Encode where points lie; no weights enter, so that it is done once for all fields.
+    def forward(self, inputs: FieldInputs, point_features: Tensor, view_dirs: Tensor) -> Tensor:
+        """V^(i) (P, V, D) of points.
 
         Args:
-            points: (P, 3), box coordinates in (-1, 1).
-            rotations: Axes of the source cameras in the world, (V, 3, 3): camera-to-world.
-
-        Returns:
-            (P, C), or (P, V, C) where it depends on the view: `encoded_points` of the inputs.
+            inputs: Where the points lie, and the encoder's features there.
+            point_features: Further inputs, (P, V, E); E may be 0.
+            view_dirs: (P, 3), or (1, 3) for all; zero means no direction.
         """
-
-    @abstractmethod
-    def forward(self, inputs: PointInputs, view_dirs: Tensor) -> Tensor:
-        """V^(i) (P, V, D) of points seen along view_dirs (P, 3), or (1, 3) for all; zero means no direction."""

@@ -7,11 +7,9 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.geometry.encoding import positional_encoding
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import FieldInputs
 from charnerf.models.mlp import residual_blocks
 from charnerf.models.single_view.base import AbstractSingleView
-
-ROTATION = 9  # numbers that carry the camera's axes beside a point's code
 
 
 @final
@@ -44,23 +42,27 @@ class CameraSingleView(AbstractSingleView):
         )
         self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
 
-    def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
-        """Encode points (P, 3) in each camera's axes, with those axes, as (P, V, C + 9)."""
-        turned = (points[:, None, :, None] * rotations).sum(-2)  # transposed: world to camera
+    def encode(self, points: Tensor, rotations: Tensor) -> Tensor:
+        """Code (P, V, C) of points (P, 3) in the axes (V, 3, 3) of each camera, the points themselves first."""
+        turned = _turned(points, rotations)
         code = positional_encoding(turned * (self.factor / math.pi), self.octaves)
-        axes = rotations.reshape(1, -1, ROTATION).expand(len(points), -1, -1)
-        return torch.cat((turned, code, axes), dim=-1)
+        return torch.cat((turned, code), dim=-1)
 
-    def forward(self, inputs: PointInputs, view_dirs: Tensor) -> Tensor:
+    def forward(self, inputs: FieldInputs, point_features: Tensor, view_dirs: Tensor) -> Tensor:
         """V^(i) (P, V, D)."""
-        code, axes = inputs.encoded_points[..., :-ROTATION], inputs.encoded_points[..., -ROTATION:]
-        directions = (view_dirs[:, None, :, None] * axes.unflatten(-1, (3, 3))).sum(-2)
+        code = self.encode(inputs.box_points, inputs.rotations)
+        directions = _turned(view_dirs, inputs.rotations).expand(len(code), -1, -1)
         x = self.from_points(torch.cat((code, directions), dim=-1))
         if self.from_point_features is not None:
-            x = x + self.from_point_features(inputs.point_features)
+            x = x + self.from_point_features(point_features)
         latents = inputs.latents.unflatten(-1, (-1, x.shape[-1])).unbind(-2)
         if len(self.blocks) == 0:
             return x + latents[0]
         for block, latent in zip(self.blocks, latents, strict=True):
             x = block(x + latent)
         return x
+
+
+def _turned(vectors: Tensor, rotations: Tensor) -> Tensor:
+    """World vectors (P, 3) in the axes (V, 3, 3) of each camera, (P, V, 3)."""
+    return (vectors[:, None, :, None] * rotations).sum(-2)  # transposed: world to camera

@@ -6,7 +6,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from charnerf.geometry.encoding import positional_encoding
-from charnerf.models.inputs import PointInputs
+from charnerf.models.inputs import FieldInputs
 from charnerf.models.mlp import residual_blocks
 from charnerf.models.single_view.base import AbstractSingleView
 from charnerf.models.stages import DIRECTION_FREQUENCIES, encode_directions
@@ -35,19 +35,16 @@ class WorldSingleView(AbstractSingleView):
         )
         self.blocks = residual_blocks(width=width, num_blocks=num_blocks)
 
-    def locate(self, points: Tensor, rotations: Tensor) -> Tensor:
-        """Encode points (P, 3) by eq. 1 as (P, C)."""
-        return positional_encoding(points, self.num_frequencies)
-
-    def forward(self, inputs: PointInputs, view_dirs: Tensor) -> Tensor:
+    def forward(self, inputs: FieldInputs, point_features: Tensor, view_dirs: Tensor) -> Tensor:
         """V^(i) (P, V, D)."""
-        size = inputs.encoded_points.shape[-1]
+        code = positional_encoding(inputs.box_points, self.num_frequencies)
+        size = code.shape[-1]
         weight = self.from_points.weight
         # one direction for all points costs one row, not one a point
-        located = F.linear(inputs.encoded_points, weight[:, :size]) + F.linear(
+        located = F.linear(code, weight[:, :size]) + F.linear(
             encode_directions(view_dirs), weight[:, size:], self.from_points.bias
         )
         x = inputs.latents + located[:, None]
-        return self.blocks(
-            x if self.from_point_features is None else x.add_(self.from_point_features(inputs.point_features))
-        )
+        if self.from_point_features is not None:
+            x = x.add_(self.from_point_features(point_features))
+        return self.blocks(x)

@@ -8,19 +8,18 @@ f1's features. A step then costs the combinator, f2 and the head alone.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import edges_from_t_vals, merge_t_vals, stratified_t_vals
-from charnerf.models.charnerf import CharNeRF, EncodedViews
+from charnerf.models.character import CharacterField
 from charnerf.models.field import Field
-from charnerf.models.inputs import PointInputs
-from charnerf.models.lookup import maps_to_rows
+from charnerf.models.inputs import PointViews
 from charnerf.scene import Scene
-from charnerf.types import FieldOutput, RayBundle, TensorRecord
+from charnerf.types import RayBundle, TensorRecord
 from charnerf.volume.compositing import composite
 from charnerf.volume.renderers.base import POINTS_AT_ONCE, WHITE, AbstractRenderer
 
@@ -48,19 +47,21 @@ class PlacedRays(TensorRecord):
 
 @dataclass(frozen=True)
 class _Rows(TensorRecord):
-    """What is known of samples (K,): f1's features (K, V, D), and inputs without what only f1 reads."""
+    """What frozen parts answer at samples (K,): f1's features (K, V, D), and what the parts behind f1 read beside them."""
 
     view_features: Tensor
-    inputs: PointInputs
+    views: PointViews
+    view_dirs: Tensor
+    kept: Tensor
 
 
 @dataclass(frozen=True)
-class KnownRays:
-    """Rays whose frozen part is known.
+class CachedRays:
+    """Rays whose frozen part is computed.
 
     Attributes:
         placed: Their samples.
-        rows: What is known of the K samples inside.
+        rows: What frozen parts answer at the K samples inside.
         numbers: Row of each sample, (R, S); K where it lies outside.
     """
 
@@ -116,72 +117,41 @@ def _in_chunks(function: Callable[[Tensor, Tensor], Tensor], points: Tensor, dir
     return torch.cat(parts) if parts else points[:, 0]
 
 
-def within_memory(placed: PlacedRays, network: CharNeRF, num_views: int, mib: float) -> int:
-    """How many of the rays may be kept within a bound, MiB, at the mean number of samples a ray."""
-    row = num_views * (finest(network).multi_view.density.in_features + 8) * BYTES
+def within_memory(placed: PlacedRays, field: CharacterField, mib: float) -> int:
+    """How many of the rays may be cached within a bound, MiB, at the mean number of samples a ray."""
+    row = len(field.maps.mirrored) * (field.field.multi_view.density.in_features + 8) * BYTES
     samples = int(placed.inside.sum()) / max(1, len(placed.inside))
     return max(1, int(mib * 2**20 / (row * max(samples, 1.0))))
 
 
-def finest(network: CharNeRF) -> Field:
-    """The field that pictures and meshes are made of."""
-    return network.coarse if network.fine is None else network.fine
-
-
 @torch.no_grad()
-def know(network: CharNeRF, encoded: EncodedViews, placed: PlacedRays) -> KnownRays:
+def cache(field: CharacterField, placed: PlacedRays) -> CachedRays:
     """Compute once what frozen parts answer at the samples inside the hull."""
-    field = finest(network)
-    inputs_of = _inputs_of(network, encoded, field)
     points, size = placed.points[placed.inside], POINTS_AT_ONCE
     dirs = placed.directions[:, None].expand_as(placed.points)[placed.inside]
     parts = []
     for start in range(0, len(points), size):
-        inputs = inputs_of(points[start : start + size], dirs[start : start + size])
-        features = field.view_features(inputs)
-        unread = {"latents": inputs.latents[..., :0], "point_features": inputs.point_features[..., :0]}
-        slim = replace(inputs, **unread, encoded_points=inputs.encoded_points[..., :0])
-        parts.append(_Rows(features, slim))
+        inputs, view_dirs = field.read(points[start : start + size]), dirs[start : start + size]
+        features = field.field.view_features(inputs, view_dirs)
+        parts.append(_Rows(features, inputs.views, view_dirs, inputs.kept))
     numbers = torch.full_like(placed.inside, len(points), dtype=torch.long)
     numbers[placed.inside] = torch.arange(len(points), device=points.device)
-    return KnownRays(placed, _Rows.joined(parts), numbers)
+    return CachedRays(placed, _Rows.joined(parts), numbers)
 
 
-def _inputs_of(
-    network: CharNeRF, encoded: EncodedViews, field: Field
-) -> Callable[[Tensor, Tensor], PointInputs]:
-    """The field's inputs at points of the one character that was encoded."""
-    views = encoded.views[0]
-    present = views.present.nonzero()[:, 0]
-    views, maps = views[present], encoded.feature_maps[0][present]
-    hull = None if encoded.hull is None else encoded.hull[0]
-    view_maps = network.view_maps(views, hull, present, maps)
-    latents, mirrored = field.hoist(maps_to_rows(maps)), views.mirrored.to(maps.dtype)
-    return lambda points, dirs: network.point_inputs(
-        points, dirs, maps=view_maps, latents=latents, mirrored=mirrored
-    )
-
-
-def render_known(
-    field: Field, renderer: AbstractRenderer, known: KnownRays, index: Tensor
+def render_cached(
+    field: Field, renderer: AbstractRenderer, cached: CachedRays, index: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Colours on white (r, 3) and opacities (r,) of some of the rays, by what follows f1 in a field."""
-    numbers = known.numbers[index]
-    inside = numbers < len(known.rows.view_features)
-    rows = known.rows[numbers[inside]]
-    answer = answer_known(field, rows)
+    numbers = cached.numbers[index]
+    inside = numbers < len(cached.rows.view_features)
+    rows = cached.rows[numbers[inside]]
+    trunk = field.fuse(rows.view_features, rows.views, rows.view_dirs)
+    colors, filled = field.colors(trunk, rows.views, rows.view_dirs), field.densities(trunk, rows.kept)
     at = inside.reshape(-1).nonzero()[:, 0]
-    rgb = answer.rgb.new_zeros(inside.numel(), 3).index_copy(0, at, answer.rgb)
-    densities = answer.densities.new_zeros(inside.numel()).index_copy(0, at, answer.densities)
-    placed = known.placed[index]
+    rgb = colors.new_zeros(inside.numel(), 3).index_copy(0, at, colors)
+    densities = filled.new_zeros(inside.numel()).index_copy(0, at, filled)
+    placed = cached.placed[index]
     weights, _ = renderer.quadrature.weights(densities.reshape(inside.shape), placed.s_vals, placed.s_edges)
     picture = composite(weights, rgb.reshape(*inside.shape, 3), weights.new_tensor(WHITE))
     return picture, weights.sum(-1)
-
-
-def answer_known(field: Field, rows: _Rows) -> FieldOutput:
-    """What a field answers at samples whose f1 is known."""
-    trunk = field.fuse(rows.view_features, rows.inputs)
-    return FieldOutput(
-        rgb=field.colors(trunk, rows.inputs), densities=field.kept_densities(trunk, rows.inputs)
-    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from charnerf.finetuning.known import KnownRays, finest, know, place, render_known, within_memory
+from charnerf.finetuning.cached_rays import CachedRays, cache, place, render_cached, within_memory
 from charnerf.finetuning.recipe import Recipe
 from charnerf.finetuning.regions import held_out_patches
 from charnerf.geometry.cameras import (
@@ -17,7 +17,8 @@ from charnerf.geometry.cameras import (
     pixel_rays,
 )
 from charnerf.geometry.framing import camera_distance
-from charnerf.models.charnerf import CharNeRF, EncodedViews
+from charnerf.models.character import CharacterField
+from charnerf.models.field import Field
 from charnerf.scene import Scene
 from charnerf.types import Cameras, LeftOut, RayBundle, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -35,7 +36,7 @@ CHUNK = 1024  # rays
 class Targets:
     """Rays with what they shall show: colours on white (R, 3) and opacities (R,), and how much each counts (R,)."""
 
-    known: KnownRays
+    cached: CachedRays
     rgb: Tensor
     alpha: Tensor
     weights: Tensor
@@ -45,7 +46,7 @@ class Targets:
 
 
 @dataclass(frozen=True)
-class Material:
+class RaySets:
     """Everything that fine-tuning reads, prepared once.
 
     Attributes:
@@ -63,21 +64,19 @@ class Material:
     left_out: LeftOut
 
 
-def gather(
-    network: CharNeRF,
+def prepare_rays(
+    field: CharacterField,
     renderer: AbstractRenderer,
-    encoded: EncodedViews,
     scene: Scene,
     views: SourceViews,
     radius: float,
     recipe: Recipe,
-) -> Material:
+) -> RaySets:
     """Prepare the rays of a character.
 
     Args:
-        network: With the starting weights.
+        field: The scene's finest field, with the starting weights.
         renderer: Places samples and composites.
-        encoded: The character, encoded once.
         scene: The character under the starting weights.
         views: Its drawings, B = 1.
         radius: Of the character around the box's centre, m.
@@ -87,7 +86,7 @@ def gather(
     rays, rgb, alpha, held = _drawn_rays(views, recipe)
     placed, hit = place(renderer, scene, rays, generator)
     rgb, alpha, held = rgb[hit], alpha[hit], held[hit]
-    most = within_memory(placed, network, encoded.views.present.shape[1], 0.75 * recipe.memory_mib)
+    most = within_memory(placed, field, 0.75 * recipe.memory_mib)
     kept = torch.randperm(len(hit), generator=generator)[:most].sort().values.to(hit.device)
     inside = int(placed.inside[kept].sum())
     drawn = len(rays.origins)
@@ -100,19 +99,17 @@ def gather(
     )
 
     def targets(index: Tensor) -> Targets:
-        return Targets(
-            know(network, encoded, placed[index]), rgb[index], alpha[index], torch.ones_like(alpha[index])
-        )
+        return Targets(cache(field, placed[index]), rgb[index], alpha[index], torch.ones_like(alpha[index]))
 
     trusted, guard = (
-        _answered(network, renderer, encoded, scene, cameras, count, generator)
+        _answered(field, renderer, scene, cameras, count, generator)
         for cameras, count in zip(
             _novel_cameras(scene, radius, generator),
             (min(8 * recipe.novel_rays, most // 3 + 1), GUARD_RAYS),
             strict=True,
         )
     )
-    return Material(targets(kept[~held[kept]]), targets(kept[held[kept]]), trusted, guard, left_out)
+    return RaySets(targets(kept[~held[kept]]), targets(kept[held[kept]]), trusted, guard, left_out)
 
 
 def _drawn_rays(views: SourceViews, recipe: Recipe) -> tuple[RayBundle, Tensor, Tensor, Tensor]:
@@ -158,15 +155,14 @@ def _novel_cameras(scene: Scene, radius: float, generator: torch.Generator) -> t
 
 @torch.no_grad()
 def _answered(
-    network: CharNeRF,
+    field: CharacterField,
     renderer: AbstractRenderer,
-    encoded: EncodedViews,
     scene: Scene,
     cameras: Cameras,
     count: int,
     generator: torch.Generator,
 ) -> Targets:
-    """Up to `count` rays of cameras that meet the hull, with the answers of the network as it is."""
+    """Up to `count` rays of cameras that meet the hull, with the answers of the field as it is."""
     device = scene.bounds.box_min.device
     cameras, pixels = cameras.to(device), pixel_centres(cameras.width, cameras.height).reshape(-1, 2)
     some = -(-TRIED * count // cameras.shape[0])
@@ -181,16 +177,16 @@ def _answered(
     hit = (renderer.occupied(scene, rays).length > 0).nonzero()[:, 0].cpu()
     drawn = hit[torch.randperm(len(hit), generator=generator)[:count]].to(device)
     placed, _ = place(renderer, scene, rays[drawn], generator)
-    known = know(network, encoded, placed)
-    rgb, alpha = render_all(network, renderer, known)
-    return Targets(known, rgb, alpha, (alpha > OPAQUE).to(alpha.dtype))
+    cached = cache(field, placed)
+    rgb, alpha = render_all(field.field, renderer, cached)
+    return Targets(cached, rgb, alpha, (alpha > OPAQUE).to(alpha.dtype))
 
 
 @torch.no_grad()
-def render_all(network: CharNeRF, renderer: AbstractRenderer, known: KnownRays) -> tuple[Tensor, Tensor]:
-    """Colours (R, 3) and opacities (R,) of all known rays, chunk by chunk, without gradient."""
-    index = torch.arange(len(known), device=known.numbers.device)
-    parts = [render_known(finest(network), renderer, known, some) for some in index.split(CHUNK)]
+def render_all(field: Field, renderer: AbstractRenderer, cached: CachedRays) -> tuple[Tensor, Tensor]:
+    """Colours (R, 3) and opacities (R,) of all cached rays, chunk by chunk, without gradient."""
+    index = torch.arange(len(cached), device=cached.numbers.device)
+    parts = [render_cached(field, renderer, cached, some) for some in index.split(CHUNK)]
     if not parts:
         return index.new_zeros(0, 3).float(), index.new_zeros(0).float()
     return torch.cat([rgb for rgb, _ in parts]), torch.cat([alpha for _, alpha in parts])
