@@ -1,6 +1,7 @@
 """What `charnerf mesh` measured: meshes of a split, levels of detail."""
 
-from charnerf.evaluation.mesh_scores import KINDS, mean_of
+from charnerf.evaluation.angles import mean_of
+from charnerf.evaluation.mesh_scores import KINDS
 from docs.figures.sources import markdown, read
 
 SCORES = {
@@ -19,7 +20,7 @@ SCORES = {
 def meshes(file: str) -> str:
     """Texture PSNR by kind of colours and view, dB, outlines and surface, by character and on average."""
     by_name = read(file)["characters"]
-    means = {key: mean_of(by_name.values(), key) for key in SCORES}
+    means = mean_of(list(by_name.values()), list(SCORES))
     rows = [
         [name, *(form.format(found[key]) for key, (_, form) in SCORES.items())]
         for name, found in {**by_name, "**mean**": means}.items()

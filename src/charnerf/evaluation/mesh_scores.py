@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import torch
 import trimesh
 
 from charnerf.data.characters import Character
+from charnerf.evaluation.angles import Record, mean_of
 from charnerf.evaluation.baselines import VisualHullBaseline
 from charnerf.evaluation.surface_error import surface_scores, true_points
 from charnerf.markdown import table
@@ -22,6 +24,19 @@ from charnerf.surfaces.render import render_mesh
 from charnerf.types import Cameras
 
 KINDS: tuple[Texture, ...] = ("drawings", "field", "vertex")
+COLUMNS = {
+    **{f"{kind}_source_texture_psnr": (kind, "{:.2f}") for kind in KINDS},
+    **{f"{kind}_novel_texture_psnr": (kind, "{:.2f}") for kind in KINDS},
+    "iou": ("IoU", "{:.3f}"),
+    "chamfer_mm": ("Chamfer, mm", "{:.1f}"),
+    "f_score": ("F", "{:.3f}"),
+    "hull_iou": ("hull IoU", "{:.3f}"),
+    "hull_chamfer_mm": ("hull Chamfer", "{:.1f}"),
+    "hull_f_score": ("hull F", "{:.3f}"),
+    "texels_from_field": ("from field", "{:.2f}"),
+    "surface_seconds": ("surface, s", "{:.1f}"),
+    "drawings_seconds": ("texture, s", "{:.1f}"),
+}
 WHOLE = 0.99  # alpha from which a pixel shows the character alone
 NOVEL_VIEWS = 12  # at most, evenly chosen
 
@@ -39,26 +54,26 @@ def score_meshes(scene: Scene, character: Character, options: MeshOptions) -> di
         "source": (sources.cameras[0].to("cpu"), sources.images[0].cpu().movedim(1, -1).numpy()),
         "novel": (character.cameras[indices], character.images(indices).numpy() / 255.0),
     }
-    found = find_surface(scene, sources, options)
-    result: dict[str, Any] = {"surface_seconds": found.seconds, "level": found.extraction.level}
+    surface = find_surface(scene, sources, options)
+    result: dict[str, Any] = {"surface_seconds": surface.seconds, "level": surface.extraction.level}
     for kind in KINDS:
         start = time.perf_counter()
-        built = finish_mesh(scene, found, sources, replace(options, texture=kind, height=None))
+        built = finish_mesh(scene, surface, sources, replace(options, texture=kind, height=None))
         result[f"{kind}_seconds"] = time.perf_counter() - start
         if built.textured is not None and kind == "drawings":
             result["texels_from_field"] = built.textured.num_from_field / max(built.textured.num_texels, 1)
         for name, (cameras, images) in true_views.items():
             scores = _picture_scores(built.mesh, cameras, images)
             result |= {f"{kind}_{name}_{key}": value for key, value in scores.items()}
-    result |= {"iou": result["vertex_novel_iou"], **_surface(found.extraction.mesh, character)}
+    result |= {"iou": result["vertex_novel_iou"], **_surface_scores(surface.extraction.mesh, character)}
     hull = VisualHullBaseline(sources).mesh
     if hull is not None:
-        result |= {f"hull_{key}": value for key, value in _surface(hull, character).items()}
+        result |= {f"hull_{key}": value for key, value in _surface_scores(hull, character).items()}
         result["hull_iou"] = _picture_scores(hull, *true_views["novel"])["iou"]
     return result
 
 
-def _surface(mesh: trimesh.Trimesh, character: Character) -> dict[str, float | None]:
+def _surface_scores(mesh: trimesh.Trimesh, character: Character) -> dict[str, float | None]:
     if character.mesh_file is None:
         return {}
     return surface_scores(mesh, true_points(character.mesh_file), character.cameras)[0]
@@ -67,12 +82,12 @@ def _surface(mesh: trimesh.Trimesh, character: Character) -> dict[str, float | N
 def _picture_scores(mesh: trimesh.Trimesh, cameras: Cameras, truth: np.ndarray) -> dict[str, float]:
     """Mean over views (N, H, W, 4) of texture PSNR, foreground PSNR and silhouette IoU."""
     rows = []
-    for found, true in zip(render_mesh(mesh, cameras), truth, strict=True):
-        both = (found[..., 3] > WHOLE) & (true[..., 3] > WHOLE)
+    for predicted, true in zip(render_mesh(mesh, cameras), truth, strict=True):
+        both = (predicted[..., 3] > WHOLE) & (true[..., 3] > WHOLE)
         inside = true[..., 3] > 0.5
-        squared = (found[..., :3] - true[..., :3]) ** 2
-        squared_on_white = (on_white(found) - on_white(true)) ** 2
-        hit = found[..., 3] > 0.5
+        squared = (predicted[..., :3] - true[..., :3]) ** 2
+        squared_on_white = (on_white(predicted) - on_white(true)) ** 2
+        hit = predicted[..., 3] > 0.5
         union = (hit | inside).sum()
         iou = (hit & inside).sum() / union if union else 1.0
         rows.append((_decibels(squared[both]), _decibels(squared_on_white[inside]), float(iou)))
@@ -84,32 +99,25 @@ def _decibels(squared: np.ndarray) -> float:
     return float(-10.0 * np.log10(max(float(squared.mean()), 1e-10))) if squared.size else float("nan")
 
 
-def score_table(rows: dict[str, dict[str, Any]]) -> str:
+def score_table(rows: Mapping[str, Record]) -> list[str]:
     """Figures by character, and their means, as Markdown."""
-    heads = ["character", "drawings", "field", "vertex", "drawings", "field", "vertex"]
-    heads += ["IoU", "Chamfer, mm", "F", "hull IoU", "hull Chamfer", "hull F", "from field", "surface, s"]
-    heads += ["texture, s"]
-    keys = [f"{kind}_{view}_texture_psnr" for view in ("source", "novel") for kind in KINDS]
-    keys += ["iou", "chamfer_mm", "f_score", "hull_iou", "hull_chamfer_mm", "hull_f_score"]
-    keys += ["texels_from_field", "surface_seconds", "drawings_seconds"]
-    forms = [*["{:.2f}"] * 6, "{:.3f}", "{:.1f}", "{:.3f}", "{:.3f}", "{:.1f}", "{:.3f}", "{:.2f}"]
-    forms += ["{:.1f}", "{:.1f}"]
-    table_rows = [heads]
-    every = {**rows, "**mean**": {key: mean_of(rows.values(), key) for key in keys}}
+    heads = ["character", *(title for title, _ in COLUMNS.values())]
+    every = {**rows, "**mean**": mean_of(list(rows.values()), list(COLUMNS))}
+    lines = [heads]
     for name, row in every.items():
-        values = [row.get(key) for key in keys]
-        cells = ["-" if v is None else form.format(v) for v, form in zip(values, forms, strict=True)]
-        table_rows.append([name, *cells])
-    groups = ["", "in source views, dB", "", "", "in novel views, dB", *[""] * 11]
-    return "\n".join(table(groups, table_rows))
+        values = [(row.get(key), form) for key, (_, form) in COLUMNS.items()]
+        lines.append([name, *("-" if value is None else form.format(value) for value, form in values)])
+    groups = ["", "in source views, dB", "", "", "in novel views, dB"]
+    return table([*groups, *[""] * (len(heads) - len(groups))], lines)
 
 
-def score_text(rows: dict[str, dict[str, Any]], facts: dict[str, Any]) -> str:
+def score_text(rows: Mapping[str, Record], facts: Mapping[str, Any]) -> str:
     """The text of meshes.md: the table, what it means, and where it was measured."""
-    gain = (mean_of(rows.values(), "drawings_source_texture_psnr") or 0.0) - (
-        mean_of(rows.values(), "vertex_source_texture_psnr") or 0.0
-    )
-    lines = ["# Meshes and their colours", "", score_table(rows), ""]
+    drawn, plain = mean_of(
+        list(rows.values()), ["drawings_source_texture_psnr", "vertex_source_texture_psnr"]
+    ).values()
+    gain = (drawn or 0.0) - (plain or 0.0)
+    lines = ["# Meshes and their colours", "", *score_table(rows), ""]
     lines += [
         f"Textures from the drawings are {gain:+.1f} dB beside vertex colours in the source views.",
         "",
@@ -121,9 +129,3 @@ def score_text(rows: dict[str, dict[str, Any]], facts: dict[str, Any]) -> str:
         "",
     ]
     return "\n".join(lines)
-
-
-def mean_of(rows: Any, key: str) -> float | None:
-    """Mean of a figure over the rows that have it."""
-    values = [row[key] for row in rows if row.get(key) is not None]
-    return float(np.mean(values)) if values else None

@@ -31,7 +31,7 @@ ROUNDNESS, THICKEST = (
     0.3,
 )  # of a guessed side: depth over width, and the width of a trunk over the height
 PICTURES = (".png", ".jpg", ".jpeg", ".webp")
-_MASK, _COLOURS = "_mask", "_texture"
+_MASK, _TEXTURE = "_mask", "_texture"
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def find_drawings(folder: Path) -> list[DrawnCharacter]:
         DataError: If there is none, or a folder holds two pictures of one view.
     """
     characters = [
-        DrawnCharacter(path.stem.removesuffix(_COLOURS), {"front": path}) for path in _pictures(folder)
+        DrawnCharacter(path.stem.removesuffix(_TEXTURE), {"front": path}) for path in _pictures(folder)
     ]
     for sub in sorted(path for path in folder.iterdir() if path.is_dir()):
         files: dict[str, Path] = {}
@@ -68,7 +68,7 @@ def find_drawings(folder: Path) -> list[DrawnCharacter]:
             characters.append(DrawnCharacter(sub.name, files))
         else:
             characters += [
-                DrawnCharacter(path.stem.removesuffix(_COLOURS), {"front": path}) for path in others
+                DrawnCharacter(path.stem.removesuffix(_TEXTURE), {"front": path}) for path in others
             ]
     if not characters:
         raise DataError(
@@ -200,7 +200,7 @@ def _pictures(folder: Path) -> list[Path]:
 
 def _cut_out(path: Path) -> np.ndarray:
     """The figure of a picture, floats (H, W, 4): by the mask beside it, by its own alpha or by its background."""
-    mask = path.with_name(f"{path.stem.removesuffix(_COLOURS)}{_MASK}.png")
+    mask = path.with_name(f"{path.stem.removesuffix(_TEXTURE)}{_MASK}.png")
     if not mask.is_file():
         return cut_out(load_drawing(path)).rgba
     with Image.open(path) as picture, Image.open(mask) as alpha:
