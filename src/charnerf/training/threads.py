@@ -16,7 +16,7 @@ import lightning as L
 import torch
 
 FIXED_BY = ("OMP_NUM_THREADS", "MKL_NUM_THREADS")
-ROUNDS = 5  # of a trial, in each of which every number of threads takes two steps; the second counts
+ROUNDS = 3  # of a trial, in each of which every number of threads takes two steps; the second counts
 TOO_SLOW = 2.0  # times the best: one step is enough to leave a number of threads out of a trial
 SLOWER = 1.25  # times the best: a round is enough
 JUMP = 1.5  # two steps in a row that differ by this factor from the usual end the choice
