@@ -214,7 +214,7 @@ class ErrorEstimate:
         asked: Largest error of a colour asked for.
         estimated: Estimated error of each ray's colour, (...).
         num_samples: Densities evaluated.
-        num_colours: Colours evaluated.
+        num_colors: Colours evaluated.
         num_stopped: Rays whose far part was left out because what lies before is opaque.
         num_unresolved: Rays whose estimate stayed above what was asked.
     """
@@ -222,7 +222,7 @@ class ErrorEstimate:
     asked: float
     estimated: Tensor
     num_samples: int
-    num_colours: int
+    num_colors: int
     num_stopped: int
     num_unresolved: int
 

@@ -23,7 +23,7 @@ from support.subjects import LIKE, pictured_person, tiny_subject
 CPU = torch.device("cpu")
 
 
-def test_tricks_change_seconds_and_no_colours():
+def test_tricks_change_seconds_and_no_colors():
     one = tiny_subject()
     bench = type("Bench", (), {"like": LIKE, "renderers": {"culled": CulledRenderer(**LIKE)}})()
     with torch.no_grad():

@@ -115,7 +115,7 @@ def test_rays_still_reach_the_surface_that_they_saw(batch, change):
     torch.testing.assert_close(changed.rays.directions.norm(dim=-1), torch.ones_like(changed.depth))
 
 
-def test_colours_are_exchanged_in_drawings_and_targets_alike(batch):
+def test_colors_are_exchanged_in_drawings_and_targets_alike(batch):
     order = torch.tensor((2, 0, 1))
     changed = recolor(batch, order)
     torch.testing.assert_close(changed.rgb, batch.rgb[..., order])

@@ -93,7 +93,7 @@ def test_the_same_request_makes_the_same_batch(figure_dataset, store):
     assert dataset_of(store, **settings, seed=2**32 - 1)[asked].rgb.isfinite().all()
 
 
-def test_rays_carry_the_colours_that_the_figure_has(store):
+def test_rays_carry_the_colors_that_the_figure_has(store):
     """Each ray traced through the figure in closed form: on white, away from antialiased edges."""
     batch = dataset_of(store, characters=2)[request(rays=600)]
     assert set(batch.names) == set(NAMES) and batch.rgb.shape == (2, 300, 3)

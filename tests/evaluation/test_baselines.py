@@ -59,7 +59,7 @@ def test_hull_holds_the_object(case):
     assert from_below.mean() > 0.97
 
 
-def test_hull_is_drawn_from_any_camera_in_the_colours_of_the_drawings(case):
+def test_hull_is_drawn_from_any_camera_in_the_colors_of_the_drawings(case):
     mesh, _, hull = case
     for camera in (target_cameras(9)[5], target_cameras(9)[8]):
         rgba = photograph(mesh, camera) / 255.0

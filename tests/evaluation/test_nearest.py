@@ -64,7 +64,7 @@ def test_with_the_right_shape_every_picture_is_better_than_the_hulls(training, f
     assert best > 30.0
 
 
-def test_a_shape_beside_the_drawing_takes_the_nearest_colour_of_the_figure():
+def test_a_shape_beside_the_drawing_takes_the_nearest_color_of_the_figure():
     image = torch.zeros(1, 4, 5, 6)
     image[0, :, 2, 1] = torch.tensor([0.9, 0.2, 0.1, 1.0])
     image[0, :, 2, 4] = torch.tensor([0.1, 0.2, 0.9, 1.0])

@@ -29,7 +29,7 @@ def test_shrunk_views_are_those_drawn_smaller():
     assert ((found.images - small.images)[:, :, :3] * alpha).abs().mean() < 0.01
 
 
-def test_colours_under_no_alpha_do_not_bleed():
+def test_colors_under_no_alpha_do_not_bleed():
     views = helpers.source_views(helpers.ball(), helpers.source_cameras(size=64))
     alpha = views.images[:, :, 3:]
     red = torch.tensor((1.0, 0.0, 0.0)).view(1, 1, 3, 1, 1).expand_as(views.images[:, :, :3])

@@ -178,7 +178,7 @@ def test_the_field_paints_everything_when_asked():
     assert np.median(np.abs(found - wanted)) < 0.01
 
 
-def test_a_part_of_no_size_leaves_the_other_colours_alone():
+def test_a_part_of_no_size_leaves_the_other_colors_alone():
     """Decimation can leave a loose triangle whose corners lie in one place: nothing ties it to anything."""
     ball = trimesh.creation.icosphere(2, 0.5)
     speck = trimesh.Trimesh(np.full((3, 3), 2.0), [[0, 1, 2]], process=False)

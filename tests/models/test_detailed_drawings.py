@@ -35,7 +35,7 @@ def points_of_stripes() -> torch.Tensor:
     return torch.stack((across, torch.full_like(across, -0.5), torch.full_like(across, 1.0)), dim=1)
 
 
-def test_colours_follow_the_finer_drawings_and_densities_do_not_change(model):
+def test_colors_follow_the_finer_drawings_and_densities_do_not_change(model):
     points = points_of_stripes()
     dirs = torch.tensor((0.0, 1.0, 0.0)).expand_as(points)
     with torch.no_grad():
@@ -49,7 +49,7 @@ def test_colours_follow_the_finer_drawings_and_densities_do_not_change(model):
     assert contrast[2] > 10.0 * contrast[0] and contrast[1] < 0.5 * contrast[2]
 
 
-def test_some_points_are_coloured_as_they_are_among_all(model):
+def test_some_points_are_colored_as_they_are_among_all(model):
     """Densities first, finer colours for every third point: the same numbers as all at once."""
     points = points_of_stripes()
     dirs = torch.tensor((0.0, 1.0, 0.0)).expand_as(points)
@@ -86,7 +86,7 @@ def test_other_views_are_no_detail_of_these(model):
         model.encode(striped(SMALL), detailed=striped(LARGE)[:, :2])
 
 
-def test_views_of_any_size_are_encoded_as_the_model_was_trained_and_coloured_as_given(model):
+def test_views_of_any_size_are_encoded_as_the_model_was_trained_and_colored_as_given(model):
     large = striped(LARGE)
     small = model.fitted(large)
     assert small.cameras.width == SMALL and model.fitted(small) is small

@@ -28,7 +28,7 @@ from support.random_inputs import field_inputs, point_views, random_dirs
 WIDTH = tiny_models.WIDTH
 
 
-def test_a_closed_gate_keeps_the_blend_within_the_source_colours():
+def test_a_closed_gate_keeps_the_blend_within_the_source_colors():
     """A convex combination of the colours of the valid views; with one valid view, its very colour."""
     seen, dirs = point_views(200), random_dirs(200)
     head = tiny_models.shake(BlendHead(width=WIDTH, hidden=8).double())
@@ -62,7 +62,7 @@ def test_a_new_blend_head_prefers_the_view_that_sees_the_point():
 
 
 @pytest.mark.parametrize("head", [BlendHead(width=WIDTH, hidden=8), RadianceHead(width=WIDTH)])
-def test_heads_answer_colours_and_pass_gradcheck(head):
+def test_heads_answer_colors_and_pass_gradcheck(head):
     head = tiny_models.shake(head.double())
     seen, dirs = point_views(4), random_dirs(4)
     features = torch.randn(4, WIDTH, dtype=torch.float64, requires_grad=True)

@@ -131,7 +131,7 @@ def test_warping_by_a_shift():
     np.testing.assert_allclose(warped(figure(), flow)[:, 8:], figure()[:, 4:-4], atol=1e-5)
 
 
-def test_filling_keeps_colours_and_takes_the_nearest_elsewhere():
+def test_filling_keeps_colors_and_takes_the_nearest_elsewhere():
     rgba = np.zeros((SIDE, SIDE, 4), np.float32)
     rgba[40:80, 40:60] = (1.0, 0.0, 0.0, 1.0)
     rgba[40:80, 60:80] = (0.0, 0.0, 1.0, 1.0)

@@ -64,9 +64,9 @@ class FakeModel:
 @pytest.fixture
 def drawings(tmp_path) -> dict[str, Path]:
     paths = {}
-    for view, colour in (("front", "red"), ("side", "orange"), ("back", "green")):
+    for view, color in (("front", "red"), ("side", "orange"), ("back", "green")):
         picture = Image.new("RGB", (200, 260), "white")
-        ImageDraw.Draw(picture).ellipse((50, 30, 150, 230), fill=colour)
+        ImageDraw.Draw(picture).ellipse((50, 30, 150, 230), fill=color)
         paths[view] = tmp_path / f"{view}.png"
         picture.save(paths[view])
     return paths
@@ -107,10 +107,10 @@ def test_the_mesh_wears_the_drawings(tmp_path, drawings):
     done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
     uv = np.asarray(mesh.visual.uv)
-    colours = read_texture(mesh.visual.material.baseColorTexture, uv)
+    colors = read_texture(mesh.visual.material.baseColorTexture, uv)
     left = mesh.vertices[:, 0] > 0.45  # Y up: x stays the character's left
     assert left.any()
-    np.testing.assert_allclose(np.median(colours[left], axis=0), (1.0, 165 / 255, 0.0), atol=0.02)
+    np.testing.assert_allclose(np.median(colors[left], axis=0), (1.0, 165 / 255, 0.0), atol=0.02)
     in_vertices = replace(OPTIONS, mesh=replace(MESH, texture="vertex"))
     plain = reconstruct(FakeModel(), tmp_path / "plain", in_vertices, turnaround(**drawings))
     assert trimesh.load(plain.mesh, force="mesh").visual.material.baseColorTexture is None

@@ -122,7 +122,7 @@ def test_what_nobody_sees_is_not_evaluated():
     assert rendering.estimate is not None
     assert deepest < 0.6, "the ball's back, at y = 0.7, can not be seen"
     assert rendering.estimate.num_stopped == 64
-    assert 0 < asked == rendering.estimate.num_colours < 0.3 * rendering.estimate.num_samples
+    assert 0 < asked == rendering.estimate.num_colors < 0.3 * rendering.estimate.num_samples
 
 
 def test_what_is_returned_may_enter_a_gradient():

@@ -143,9 +143,9 @@ def test_weights_partition_the_light(*, shape, num_samples, low, span, seed, dou
     depth = expected_depth(weights, t_vals, t_vals[..., -1]) + depth_over_background(
         weights, t_vals, t_vals[..., -1]
     )
-    colour = composite(weights, torch.rand((*shape, num_samples, 3), dtype=dtype), torch.ones(3, dtype=dtype))
-    assert colour.min() >= -BOUNDS[dtype] and colour.max() <= 1 + BOUNDS[dtype]
-    (depth.sum() + colour.sum() + final.sum()).backward()
+    color = composite(weights, torch.rand((*shape, num_samples, 3), dtype=dtype), torch.ones(3, dtype=dtype))
+    assert color.min() >= -BOUNDS[dtype] and color.max() <= 1 + BOUNDS[dtype]
+    (depth.sum() + color.sum() + final.sum()).backward()
     assert densities.grad.isfinite().all() and deltas.grad.isfinite().all()
 
 

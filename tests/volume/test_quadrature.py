@@ -21,7 +21,7 @@ def fit_order(counts: list[int], errors: list[float]) -> float:
     return float(((x - x.mean()) * (y - y.mean())).sum() / (x - x.mean()).square().sum())
 
 
-def colour_error(quadrature: AbstractQuadrature, count: int, generator: torch.Generator | None) -> float:
+def color_error(quadrature: AbstractQuadrature, count: int, generator: torch.Generator | None) -> float:
     """RMS error of the composited colour c(t) = t^2 through the exponential density 6 exp(-2 t) on [0, 1]."""
     t = (torch.arange(1 << 17, dtype=torch.float64) + 0.5) / (1 << 17)
     depth = 3.0 * -torch.expm1(-2.0 * t)
@@ -40,7 +40,7 @@ def colour_error(quadrature: AbstractQuadrature, count: int, generator: torch.Ge
 def test_error_falls_with_the_square_of_the_spacing(quadrature, jittered):
     counts = [16, 32, 64, 128, 256]
     generator = torch.Generator().manual_seed(0) if jittered else None
-    order = fit_order(counts, [colour_error(quadrature, count, generator) for count in counts])
+    order = fit_order(counts, [color_error(quadrature, count, generator) for count in counts])
     assert order == pytest.approx(2.0, abs=0.2)
 
 

@@ -64,7 +64,7 @@ class Measured:
                 "estimated": float(self.estimate.estimated.amax()),
                 "true": self.max_error,
                 "densities": self.estimate.num_samples,
-                "colours": self.estimate.num_colours,
+                "colours": self.estimate.num_colors,
                 "rays_stopped": self.estimate.num_stopped,
                 "rays_unresolved": self.estimate.num_unresolved,
             }

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from charnerf.capture.outline import CELL_WIDTH, ROW_HEIGHT, middle_runs
+from charnerf.capture.turns import rise, turned
 from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
@@ -42,12 +43,12 @@ def lower_arms(surface: SurfaceMesh, rng: np.random.Generator) -> np.ndarray:
     x, y, z = triangles.reshape(-1, 3).T
     side, out = np.where(x < 0.0, -1.0, 1.0), np.abs(x)
     middle, soft = 0.5 * (low + high), 0.04 * HEIGHT
-    arm = _rise(z, low - soft, low) * _rise(-z, -high - soft, -high)
+    arm = rise(z, low - soft, low) * rise(-z, -high - soft, -high)
     # the forearm first, while it lies along x: down by one turn, forward by the other
-    lower = arm * _rise(out, elbow - soft, elbow + soft)
-    out, z = _turned(out, z, (elbow, middle), -elbows * lower)
-    out, y = _turned(out, y, (elbow, 0.0), -forward * lower)
-    out, z = _turned(out, z, (shoulder, middle), -down * arm * _rise(out, shoulder - soft, shoulder + soft))
+    lower = arm * rise(out, elbow - soft, elbow + soft)
+    out, z = turned(out, z, (elbow, middle), -elbows * lower)
+    out, y = turned(out, y, (elbow, 0.0), -forward * lower)
+    out, z = turned(out, z, (shoulder, middle), -down * arm * rise(out, shoulder - soft, shoulder + soft))
     return np.stack((side * np.maximum(out, 0.0), y, z), axis=1).reshape(-1, 3, 3)
 
 
@@ -82,18 +83,3 @@ def find_arms(surface: SurfaceMesh, runs: np.ndarray) -> Arms | None:
     if high < _LOW_SHOULDERS * HEIGHT:  # under a large head: what is as far out as that is no arm
         shoulder = max(shoulder, float(above.max()))
     return Arms(shoulder, reach, low, high) if 0.0 < shoulder < 0.75 * reach else None
-
-
-def _turned(
-    first: np.ndarray, second: np.ndarray, about: tuple[float, float], angles: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates turned about a place, by angles from the first axis towards the second."""
-    a, b = first - about[0], second - about[1]
-    cos, sin = np.cos(angles), np.sin(angles)
-    return about[0] + cos * a - sin * b, about[1] + sin * a + cos * b
-
-
-def _rise(values: np.ndarray, start: float, end: float) -> np.ndarray:
-    """0 before start, 1 after end, smooth between."""
-    t = np.clip((values - start) / (end - start), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)

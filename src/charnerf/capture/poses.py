@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from charnerf.capture.arms import find_arms
 from charnerf.capture.outline import CELL_WIDTH, ROW_HEIGHT, middle_runs
+from charnerf.capture.turns import rise, turned
 from charnerf.geometry.world import HEIGHT
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
@@ -83,19 +84,19 @@ def reposed(surface: SurfaceMesh, joints: Joints, pose: Pose) -> SurfaceMesh:
     left, out = x >= 0.0, np.abs(x)
     (across, shoulder), (hip, crotch), neck = joints.shoulder, joints.hip, joints.neck
     edge = np.interp(z, ROW_HEIGHT * (np.arange(len(joints.body)) + 0.5), joints.body)
-    is_head = _rise(z, neck - 0.5 * _SOFT, neck + 0.5 * _SOFT) * _rise(-out, -2.0 * across, -1.5 * across)
+    is_head = rise(z, neck - 0.5 * _SOFT, neck + 0.5 * _SOFT) * rise(-out, -2.0 * across, -1.5 * across)
     is_arm = (
-        _rise(out, edge, edge + _SOFT)
-        * _rise(z, crotch - 0.25 * HEIGHT, crotch - 0.15 * HEIGHT)
+        rise(out, edge, edge + _SOFT)
+        * rise(z, crotch - 0.25 * HEIGHT, crotch - 0.15 * HEIGHT)
         * (1.0 - is_head)
     )
-    is_leg = _rise(-z, -crotch - _SOFT, -crotch + _SOFT) * (1.0 - is_arm)
-    z, y = _turned(z, y, (crotch, 0.0), np.where(left, *pose.strides) * is_leg)
-    out, z = _turned(out, z, (hip, crotch), np.where(left, *pose.legs) * is_leg)
-    out, z = _turned(out, z, (across, shoulder), -np.where(left, *pose.arms) * is_arm)
+    is_leg = rise(-z, -crotch - _SOFT, -crotch + _SOFT) * (1.0 - is_arm)
+    z, y = turned(z, y, (crotch, 0.0), np.where(left, *pose.strides) * is_leg)
+    out, z = turned(out, z, (hip, crotch), np.where(left, *pose.legs) * is_leg)
+    out, z = turned(out, z, (across, shoulder), -np.where(left, *pose.arms) * is_arm)
     x = np.where(left, 1.0, -1.0) * out
-    x, y = _turned(x, y, (0.0, 0.0), pose.head_turn * is_head)
-    x, z = _turned(x, z, (0.0, neck), pose.head_tilt * is_head)
+    x, y = turned(x, y, (0.0, 0.0), pose.head_turn * is_head)
+    x, z = turned(x, z, (0.0, neck), pose.head_tilt * is_head)
     return replace(surface, triangles=np.stack((x, y, z), axis=1).reshape(-1, 3, 3).astype(np.float32))
 
 
@@ -108,18 +109,3 @@ def random_pose(rng: np.random.Generator, *, limbs: float, head: float) -> Pose:
         head_turn=float(rng.uniform(-head, head)),
         head_tilt=float(rng.uniform(-0.3 * head, 0.3 * head)),
     )
-
-
-def _turned(
-    first: np.ndarray, second: np.ndarray, about: tuple[float, float], angles: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates turned about a place, by angles from the first axis towards the second."""
-    a, b = first - about[0], second - about[1]
-    cos, sin = np.cos(angles), np.sin(angles)
-    return about[0] + cos * a - sin * b, about[1] + sin * a + cos * b
-
-
-def _rise(values: np.ndarray, start: float, end: float) -> np.ndarray:
-    """0 before start, 1 after end, smooth between."""
-    t = np.clip((values - start) / (end - start), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)

@@ -14,7 +14,7 @@ from torch.nn import functional as F
 REFERENCE_SIDE = 128  # pixels: widths are given for pictures of this side and grow with them
 _WOBBLE_KNOTS = 7  # a side: a wave of the hand is about a sixth of the picture
 _EDGE_CONTRAST = 0.1  # of brightness within half a line's width that gets half the ink
-_INK_COLOURS = ((0.05, 0.05, 0.07), (0.16, 0.10, 0.08), (0.10, 0.12, 0.22))  # black, sepia, blue-black
+_INK_COLORS = ((0.05, 0.05, 0.07), (0.16, 0.10, 0.08), (0.10, 0.12, 0.22))  # black, sepia, blue-black
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def random_style(generator: torch.Generator, *, wobble: float, shift: float, sca
     return DrawingStyle(
         ink=0.45 + 0.55 * draws[0],
         inner_ink=0.9 * draws[1],
-        ink_rgb=_INK_COLOURS[int(draws[2] * len(_INK_COLOURS))],
+        ink_rgb=_INK_COLORS[int(draws[2] * len(_INK_COLORS))],
         line_pixels=0.8 + 0.8 * draws[3],
         tones=0 if draws[4] < 0.25 else 3 + int(8 * (draws[4] - 0.25)),
         saturation=0.85 + 0.3 * draws[5],
@@ -77,8 +77,8 @@ def draw_pictures(images: Tensor, style: DrawingStyle, generator: torch.Generato
     ink = torch.maximum(
         style.ink * contour_ink(alpha, width), style.inner_ink * edge_ink(images[:, :3], alpha, width)
     )
-    colour = images.new_tensor(style.ink_rgb)[:, None, None]
-    premultiplied = torch.cat(((rgb + ink * (colour - rgb)) * alpha, alpha), dim=1)
+    color = images.new_tensor(style.ink_rgb)[:, None, None]
+    premultiplied = torch.cat(((rgb + ink * (color - rgb)) * alpha, alpha), dim=1)
     moved = F.grid_sample(
         premultiplied, _hand(images, style, generator), padding_mode="zeros", align_corners=False
     )

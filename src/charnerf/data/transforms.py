@@ -51,7 +51,6 @@ def transforms_text(
         source_files: File of each source view by its name, in order, V of them.
     """
     focal_x, focal_y = cameras.focal[0].tolist()
-    centre_x, centre_y = cameras.principal_point[0].tolist()
     frames = [
         {"file_path": name, "transform_matrix": cameras.world_from_camera[index].tolist()}
         | ({"depth_file_path": depth_names[index]} if depth_names else {})
@@ -62,22 +61,12 @@ def transforms_text(
             "file_path": file,
             "transform_matrix": source_cameras.world_from_camera[index].tolist(),
             "camera_model": "ORTHOGRAPHIC" if bool(source_cameras.orthographic[index]) else "PINHOLE",
-            "w": source_cameras.width,
-            "h": source_cameras.height,
-            "fl_x": float(source_cameras.focal[index, 0]),
-            "fl_y": float(source_cameras.focal[index, 1]),
-            "cx": float(source_cameras.principal_point[index, 0]),
-            "cy": float(source_cameras.principal_point[index, 1]),
+            **_intrinsics(source_cameras[index]),
         }
         for index, (name, file) in enumerate(source_files.items())
     }
     content = {
-        "w": cameras.width,
-        "h": cameras.height,
-        "fl_x": focal_x,
-        "fl_y": focal_y,
-        "cx": centre_x,
-        "cy": centre_y,
+        **_intrinsics(cameras[0]),
         "k1": 0.0,
         "k2": 0.0,
         "p1": 0.0,
@@ -89,6 +78,19 @@ def transforms_text(
         "frames": frames,
     }
     return json.dumps(content, indent=1) + "\n"
+
+
+def _intrinsics(camera: Cameras) -> dict[str, float]:
+    """Size, focal lengths and centre of a camera of shape (), pixels."""
+    (focal_x, focal_y), (centre_x, centre_y) = camera.focal.tolist(), camera.principal_point.tolist()
+    return {
+        "w": camera.width,
+        "h": camera.height,
+        "fl_x": focal_x,
+        "fl_y": focal_y,
+        "cx": centre_x,
+        "cy": centre_y,
+    }
 
 
 def read_transforms(folder: Path) -> CharacterFiles:

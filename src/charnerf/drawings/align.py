@@ -97,8 +97,8 @@ def place(rgba: np.ndarray, box: FigureBox, *, extent: float, size: int) -> np.n
     canvas = np.stack(channels, axis=-1)
     alpha = canvas[..., 3:].clip(0.0, 1.0)
     alpha = np.where(alpha < 0.5 / 255.0, 0.0, alpha)
-    colour = (canvas[..., :3] / np.maximum(alpha, 1e-3)).clip(0.0, 1.0)
-    return np.concatenate((np.where(alpha > 0, colour, 0.0), alpha), axis=-1).astype(np.float32)
+    color = (canvas[..., :3] / np.maximum(alpha, 1e-3)).clip(0.0, 1.0)
+    return np.concatenate((np.where(alpha > 0, color, 0.0), alpha), axis=-1).astype(np.float32)
 
 
 def _ends(profile: np.ndarray) -> tuple[float, float]:

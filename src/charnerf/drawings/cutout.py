@@ -154,14 +154,14 @@ def _ring(shape: tuple[int, int]) -> np.ndarray:
     return ring
 
 
-def _commonest(colours: np.ndarray) -> np.ndarray:
+def _commonest(colors: np.ndarray) -> np.ndarray:
     """Which of the colours (P, 3), CIELAB, belong to the commonest one, (P,) bool."""
-    bins = np.round(colours / 6.0).astype(int)
+    bins = np.round(colors / 6.0).astype(int)
     _, index, counts = np.unique(bins, axis=0, return_inverse=True, return_counts=True)
-    mode = colours[index.reshape(-1) == counts.argmax()].mean(0)
+    mode = colors[index.reshape(-1) == counts.argmax()].mean(0)
     for _ in range(3):
-        inlier = np.linalg.norm(colours - mode, axis=1) < MODE_TOLERANCE
-        mode = colours[inlier].mean(0)
+        inlier = np.linalg.norm(colors - mode, axis=1) < MODE_TOLERANCE
+        mode = colors[inlier].mean(0)
     return inlier
 
 
@@ -170,15 +170,15 @@ def _fit_background(lab: np.ndarray, ring: np.ndarray, inlier: np.ndarray) -> np
     height, width = ring.shape
     y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
     terms = np.stack((np.ones_like(x), x, y, x * y, x * x, y * y), axis=-1)
-    basis, colours = terms[ring], lab[ring]
+    basis, colors = terms[ring], lab[ring]
     used = inlier
     for _ in range(2):  # the second time with the border pixels that a gradient had put out of reach
         weight, *_ = np.linalg.lstsq(
             np.concatenate((basis[used], 1e-2 * np.sqrt(used.sum()) * np.diag([0, 1, 1, 1, 1, 1]))),
-            np.concatenate((colours[used], np.zeros((6, 3)))),
+            np.concatenate((colors[used], np.zeros((6, 3)))),
             rcond=None,
         )
-        used = used | (np.linalg.norm(colours - basis @ weight, axis=1) < HALO_TOLERANCE)
+        used = used | (np.linalg.norm(colors - basis @ weight, axis=1) < HALO_TOLERANCE)
     return terms @ weight
 
 
@@ -229,9 +229,9 @@ def _soft_outline(rgb: np.ndarray, figure: np.ndarray) -> np.ndarray:
         clear = (span * span).sum(-1) > 0.02
         alpha[band] = np.where(near & clear, share.clip(0.0, 1.0), alpha[band])
         part = near & clear & (share < 0.98)
-        colours = rgb.copy()
-        colours[band] = np.where(part[:, None], front, mixed)
-        rgb = colours
+        colors = rgb.copy()
+        colors[band] = np.where(part[:, None], front, mixed)
+        rgb = colors
     return np.concatenate((rgb, alpha[..., None]), axis=2).astype(np.float32)
 
 

@@ -234,8 +234,8 @@ class _Run:
         return (targets.weights[index] * errors).mean()
 
     def _errors(self, rgb: Tensor, opacity: Tensor, target: Tensor, alpha: Tensor) -> Tensor:
-        colour, mask = (rgb - target).square().sum(-1), (opacity - alpha).square()
-        return colour + self.recipe.opacity * mask
+        color, mask = (rgb - target).square().sum(-1), (opacity - alpha).square()
+        return color + self.recipe.opacity * mask
 
     @torch.no_grad()
     def _look(self, step: int, learnt: float) -> CurvePoint:

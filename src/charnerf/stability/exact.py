@@ -18,26 +18,26 @@ class ExactLight:
 
     weights: Tensor
     final: Tensor
-    colour: Tensor
+    color: Tensor
     gradients: Tensor
 
 
-def exact_light(densities: Tensor, deltas: Tensor, colours: Tensor, background: float) -> ExactLight:
+def exact_light(densities: Tensor, deltas: Tensor, colors: Tensor, background: float) -> ExactLight:
     """Compositing of rays in 50 digits, from the very numbers that the kernel got.
 
     Args:
         densities: (N, S), any dtype.
         deltas: (N, S).
-        colours: (S,), one channel.
+        colors: (S,), one channel.
         background: Of the same channel.
     """
     weights, finals, seen, gradients = [], [], [], []
-    shades = [MPF(c) for c in colours.tolist()]
+    shades = [MPF(c) for c in colors.tolist()]
     with mpmath.workdps(DIGITS):
         for sigma, delta in zip(densities.double().tolist(), deltas.double().tolist(), strict=True):
             taus = [MPF(s) * MPF(d) for s, d in zip(sigma, delta, strict=True)]
             row, passing = _ray(taus)
-            colour = sum((w * c for w, c in zip(row, shades, strict=True)), MPF(0)) + passing[-1] * MPF(
+            color = sum((w * c for w, c in zip(row, shades, strict=True)), MPF(0)) + passing[-1] * MPF(
                 background
             )
             behind = passing[-1] * MPF(background)
@@ -47,7 +47,7 @@ def exact_light(densities: Tensor, deltas: Tensor, colours: Tensor, background: 
                 behind += row[index] * shades[index]
             weights.append([float(w) for w in row])
             finals.append(float(passing[-1]))
-            seen.append(float(colour))
+            seen.append(float(color))
             gradients.append([float(s) for s in reversed(slopes)])
     return ExactLight(
         *(torch.tensor(part, dtype=torch.float64) for part in (weights, finals, seen, gradients))

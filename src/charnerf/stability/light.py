@@ -29,7 +29,7 @@ from charnerf.volume.compositing import (
 from charnerf.volume.quadrature import AbstractQuadrature, PiecewiseConstant, PiecewiseLinear
 
 NUM_BINS = 32
-_COLOURS = (torch.arange(NUM_BINS) * 37 % 64).double() / 64  # exact in every dtype
+_COLORS = (torch.arange(NUM_BINS) * 37 % 64).double() / 64  # exact in every dtype
 ONE = Bounds(5e-6, 1e-13)
 RAY = Bounds(5e-6, 1e-13, 1e-5, 1e-13)
 ALPHA = Bounds(4e-7, 1e-15, 1e-5, 1e-13)
@@ -75,7 +75,7 @@ def medium_cases(target: Target) -> Iterator[CheckRow | CheckCurve]:
             [float(NUM_BINS * depth) for depth in medium.bin_depths(NUM_BINS)], dtype=torch.float64
         )
         sigma = target.tensor(products[:, None] * NUM_BINS * bins)
-        exact = exact_light(sigma, torch.full_like(sigma, 1.0 / NUM_BINS), _COLOURS, 0.25)
+        exact = exact_light(sigma, torch.full_like(sigma, 1.0 / NUM_BINS), _COLORS, 0.25)
         yield from _light_rows(target, medium, sigma, exact, "ours")
         if medium.name in ("homogeneous slab", "two walls"):
             yield from _light_rows(target, medium, sigma, exact, "naive")
@@ -93,9 +93,9 @@ def _light_rows(
     leaf = sigma.clone().requires_grad_()
     deltas = torch.full_like(sigma, 1.0 / NUM_BINS)
     weights, final = (weights_from_densities if formula == "ours" else naive.weights)(leaf, deltas)
-    shades = _COLOURS.to(weights)[:, None].expand(*weights.shape, 1)
-    colour = composite(weights, shades, weights.new_tensor([0.25]))[..., 0]
-    (gradient,) = torch.autograd.grad(colour.sum(), leaf)
+    shades = _COLORS.to(weights)[:, None].expand(*weights.shape, 1)
+    color = composite(weights, shades, weights.new_tensor([0.25]))[..., 0]
+    (gradient,) = torch.autograd.grad(color.sum(), leaf)
     error, slope = (
         relative_to_ray(weights, exact.weights),
         relative_to_ray(gradient * NUM_BINS, exact.gradients),
@@ -108,7 +108,7 @@ def _light_rows(
         yield target.row(
             "weights + transmittance = 1", medium.name, Errors(largest(partition), None, bad), ONE
         )
-        seen = Errors(largest(doubled(colour) - exact.colour), None, bad)
+        seen = Errors(largest(doubled(color) - exact.color), None, bad)
         yield target.row("composite", medium.name, seen, ONE)
     if medium.name == "homogeneous slab":
         yield _curve("weights", target, formula, stiffnesses(target), error)

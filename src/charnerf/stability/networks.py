@@ -176,9 +176,9 @@ def loss_cases(target: Target) -> Iterator[CheckRow]:
     if target.is_half:
         return
     zero, one = target.tensor(torch.zeros(8)), target.tensor(torch.ones(8))
-    colours = target.tensor(torch.rand(8, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64))
+    colors = target.tensor(torch.rand(8, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64))
     cases = {
-        "colour, perfect": (squared_color_error, colours, colours, 0.0),
+        "colour, perfect": (squared_color_error, colors, colors, 0.0),
         "alpha, perfect": (absolute_alpha_error, one, one, 0.0),
         "alpha, all wrong": (absolute_alpha_error, zero, one, 1.0),
         "opacity, all wrong": (squared_opacity_error, one, zero, 1.0),

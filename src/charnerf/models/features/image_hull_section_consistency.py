@@ -37,13 +37,11 @@ def consistency(rgb: Tensor) -> Tensor:
     num_views = rgb.shape[1]
     if num_views < 2:
         return rgb.new_zeros(*rgb.shape[:2], 8)
-    colours = rgb.permute(
-        1, 2, 0
-    ).contiguous()  # (V, 3, P): points in a row, or each pair strides over memory
+    colors = rgb.permute(1, 2, 0).contiguous()  # (V, 3, P): points in a row, or each pair strides over memory
     apart: list[list[Tensor]] = [[] for _ in range(num_views)]
     for i in range(num_views):
         for j in range(i):
-            distance = (colours[i] - colours[j]).square().sum(0).add(1e-8).sqrt()
+            distance = (colors[i] - colors[j]).square().sum(0).add(1e-8).sqrt()
             apart[i].append(distance)
             apart[j].append(distance)
     nearest = torch.stack([reduce(torch.minimum, row) for row in apart])
@@ -55,5 +53,5 @@ def consistency(rgb: Tensor) -> Tensor:
         mean,
         nearest.mean(0).expand_as(nearest),
     )
-    others = (colours.sum(0) - colours) / (num_views - 1)
-    return torch.cat((torch.stack(scalars, dim=1), colours - others), dim=1).permute(2, 0, 1)
+    others = (colors.sum(0) - colors) / (num_views - 1)
+    return torch.cat((torch.stack(scalars, dim=1), colors - others), dim=1).permute(2, 0, 1)

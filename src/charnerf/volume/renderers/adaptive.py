@@ -39,7 +39,7 @@ from charnerf.volume.renderers.samples import Samples
 SPACING = 0.03  # m: longest bin at the start; no feature of a field read from drawings is much thinner
 MAX_BINS = 128  # of a ray at the start
 UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque surface
-UNCOLOURED_SHARE = 0.15  # of the tolerance: light whose colour need not be known
+UNCOLORED_SHARE = 0.15  # of the tolerance: light whose colour need not be known
 NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
 RAYS_AT_ONCE = 4096
 POINTS_A_STAGE = 4096  # front to back; fewer would save samples and cost calls
@@ -161,8 +161,8 @@ class AdaptiveRenderer(AbstractRenderer):
         widths = s_edges.diff(dim=-1)
         densities = block.samples.densities(numbers)
         before, after = light_before(densities * widths)
-        heavy = heavy_weights(before - after, UNCOLOURED_SHARE * self.tolerance)
-        rgb, known = block.samples.colours(numbers, (numbers >= 0) & heavy)
+        heavy = heavy_weights(before - after, UNCOLORED_SHARE * self.tolerance)
+        rgb, known = block.samples.colors(numbers, (numbers >= 0) & heavy)
         marched = march(densities, rgb, known, widths, begins, WHITE)
         stopped = ((numbers < 0) & (widths > 0)).any(-1)
         left = torch.where(stopped, after[:, -1], 0.0)
@@ -197,7 +197,7 @@ class AdaptiveRenderer(AbstractRenderer):
                 asked=self.tolerance,
                 estimated=estimated,
                 num_samples=evaluated,
-                num_colours=sum(block.samples.num_colours for block in blocks),
+                num_colors=sum(block.samples.num_colors for block in blocks),
                 num_stopped=sum(int(block.stopped.sum()) for block in blocks),
                 num_unresolved=int((estimated > self.tolerance).sum()),
             ),

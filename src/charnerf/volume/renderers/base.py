@@ -224,7 +224,7 @@ def _joined(estimates: list[ErrorEstimate], shape: tuple[int, int]) -> ErrorEsti
         asked=estimates[0].asked,
         estimated=torch.cat([one.estimated for one in estimates]).reshape(shape),
         num_samples=sum(one.num_samples for one in estimates),
-        num_colours=sum(one.num_colours for one in estimates),
+        num_colors=sum(one.num_colors for one in estimates),
         num_stopped=sum(one.num_stopped for one in estimates),
         num_unresolved=sum(one.num_unresolved for one in estimates),
     )

@@ -15,7 +15,7 @@ from torch import Tensor
 from charnerf.volume.compositing import weights_from_optical_depths
 
 DENSITY_SHARE = 0.3  # of the jump to a neighbour's density, taken as the error of a bin's mean density
-COLOUR_SHARE = 0.2  # of the difference to a neighbour's colour, taken as the error of a bin's colour
+COLOR_SHARE = 0.2  # of the difference to a neighbour's colour, taken as the error of a bin's colour
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ def march(
     jump = torch.where(alone, densities, jump)
     from_density = (before * after).sqrt() * contrast * (DENSITY_SHARE * jump * widths).clamp_max(1.0)
     step = (rgb[:, 1:] - rgb[:, :-1]).abs().amax(-1) * (joined & known[:, 1:] & known[:, :-1])
-    from_colour = COLOUR_SHARE * weights * _largest_step(step)
+    from_color = COLOR_SHARE * weights * _largest_step(step)
     return Marched(
-        rgb=total, opacity=opacity, weights=weights, errors=from_density + from_colour, unseen=unseen
+        rgb=total, opacity=opacity, weights=weights, errors=from_density + from_color, unseen=unseen
     )
 
 

@@ -27,7 +27,7 @@ class Samples:
         self.scene = scene
         self.rays = rays
         self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.field.bytes_per_point))
-        self.num_colours = 0
+        self.num_colors = 0
         self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
         self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
         self._known = torch.zeros(1, dtype=torch.bool, device=rays.origins.device)
@@ -80,7 +80,7 @@ class Samples:
         """Densities of samples by number, zero for none."""
         return self._densities[numbers]
 
-    def colours(self, numbers: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
+    def colors(self, numbers: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
         """Colours (R, K, 3) of samples by number (R, K), those wanted evaluated if they were not; and which are known."""
         missing = numbers[wanted & ~self._known[numbers]]
         if len(missing):
@@ -93,7 +93,7 @@ class Samples:
             parts = [answer.state[group - start] for (start, answer), group in groups if len(group)]
             self._rgb[missing] = self._evaluate(type(parts[0]).joined(parts), len(missing))
             self._known[missing] = True
-            self.num_colours += len(missing)
+            self.num_colors += len(missing)
         return self._rgb[numbers], self._known[numbers]
 
     def _evaluate(self, state: TensorRecord, count: int) -> Tensor:
