@@ -18,6 +18,7 @@ from charnerf.evaluation.frames import fixed_views
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.rays import occupied_to_t, points_along
 from charnerf.geometry.sampling import stratified_t_vals
+from charnerf.meshing.density_grid import densities_inside
 from charnerf.models.charnerf import CharNeRF
 from charnerf.scene import Scene
 from charnerf.surfaces.mesh_files import load_surface_mesh
@@ -33,7 +34,6 @@ SIZE = 64  # rays across a picture, at most
 OPAQUE = 0.5
 SHARES = [place / 20 for place in range(20)]  # of the rays; the worst twentieth would set the scale
 REACH, STEP = 0.3, 0.02  # m, of the distances from the true surface
-_POINTS_AT_ONCE = 16_384
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,8 @@ def _measured(
     s_vals = stratified_t_vals(torch.zeros_like(seen.length), seen.length, num_samples)
     t_vals = occupied_to_t(seen.t_edges, seen.occupied, s_vals)
     points = points_along(seen.rays, t_vals)
-    densities = _densities(scene, points, seen.rays.directions[:, None].expand_as(points))
+    dirs = seen.rays.directions[:, None].expand_as(points).reshape(-1, 3)
+    densities = densities_inside(scene, points.reshape(-1, 3), dirs).reshape(t_vals.shape)
     weights, _ = weights_from_densities(densities, (seen.length[:, None] / num_samples).expand_as(t_vals))
     opaque = weights.sum(-1) > OPAQUE
     weights, t_vals, truth = weights[opaque], t_vals[opaque], truth[opaque]
@@ -223,16 +224,6 @@ def _measured(
         hull=entry if scene.bounds.hull is not None else torch.full_like(entry, torch.nan),
         histogram=_histogram(weights, t_vals - truth[:, None]),
     )
-
-
-def _densities(scene: Scene, points: Tensor, dirs: Tensor) -> Tensor:
-    """Densities of the finest field at samples (R, S, 3), zero outside the hull."""
-    flat, towards = points.reshape(-1, 3), dirs.reshape(-1, 3)
-    packed = scene.bounds.may_hold(flat).nonzero()[:, 0]
-    densities = flat.new_zeros(len(flat))
-    for part in packed.split(_POINTS_AT_ONCE):
-        densities[part] = scene.field.densities(flat[part], towards[part]).densities.to(densities.dtype)
-    return densities.reshape(points.shape[:-1])
 
 
 def _histogram(weights: Tensor, behind: Tensor) -> Tensor:
