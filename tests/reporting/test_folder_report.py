@@ -90,6 +90,7 @@ def test_report_has_ours_beside_the_papers(grid):
 def test_html_holds_plots_and_needs_nothing_else(grid):
     write_folder_report(grid)
     page = (grid / "report.html").read_text()
+    assert "<title>charnerf: 2 rows, 3 runs in grid</title>" in page
     assert page.count('<figure class="plot">') == 3
     assert "Plotly.newPlot" in page
     assert not re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="(?!data:)', page)

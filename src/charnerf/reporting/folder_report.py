@@ -81,12 +81,14 @@ def write_folder_report(
     for number, family in enumerate(families(rows)):
         shown = shown_rows(family.rows)
         note = left_out_rows(family.rows, shown)
-        title, suffix = f": {family.variant}" if family.variant else "", f"_{number}" if number else ""
-        blocks += [*by_angle(shown, folder, title=title, suffix=suffix), *note]
-        blocks += [*picture_matrix(shown, folder, title=title, suffix=suffix), *note]
+        names = {
+            "title": f": {family.variant}" if family.variant else "",
+            "suffix": f"_{number}" if number else "",
+        }
+        blocks += [*by_angle(shown, folder, **names), *note]
+        blocks += [*picture_matrix(shown, folder, **names), *note]
         if drawings is not None:
-            blocks += real_drawings(shown, drawings, folder, trusted=trusted, title=title, suffix=suffix)
-            blocks += note
+            blocks += [*real_drawings(shown, drawings, folder, trusted=trusted, **names), *note]
     blocks += sharpness(rows, folder, trusted=trusted)
     blocks += attention(shown_rows(with_view_attention(rows), ATTENTION_ROWS), folder, trusted=trusted)
     blocks += lods(rows)
