@@ -1,10 +1,12 @@
 """A reader of a file sees all of the old one or all of the new one."""
 
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
-from charnerf.files import write_aside, write_bytes, write_folder_aside, write_text
+from charnerf.files import locked, write_aside, write_bytes, write_folder_aside, write_text
 
 
 def test_the_old_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
@@ -63,3 +65,27 @@ def test_a_failure_leaves_the_old_folder_and_nothing_else(tmp_path: Path) -> Non
         raise RuntimeError
     assert (folder / "a").read_text() == "old"
     assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks between processes there")
+@pytest.mark.parametrize("name", ["folder", "file"])
+def test_a_lock_keeps_another_process_out_until_it_is_given_up(tmp_path: Path, name: str) -> None:
+    import fcntl
+
+    path = tmp_path / name
+    if name == "folder":
+        path.mkdir()
+
+    def is_free() -> bool:  # as another process sees it: locks belong to the opened file
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        finally:
+            os.close(handle)
+        return True
+
+    with locked(path):
+        assert not is_free()
+    assert is_free()

@@ -7,7 +7,7 @@ import pytest
 import torch
 from PIL import Image
 
-from charnerf.pictures import bytes_on_white, images_on_white, on_white, save_png, to_bytes
+from charnerf.pictures import bytes_on_white, images_on_white, on_white, read_bilinear, save_png, to_bytes
 
 PIXELS = [[0.2, 0.4, 0.6, 1.0], [0.2, 0.4, 0.6, 0.5], [0.2, 0.4, 0.6, 0.0]]
 SHOWN = [[0.2, 0.4, 0.6], [0.6, 0.7, 0.8], [1.0, 1.0, 1.0]]
@@ -39,3 +39,13 @@ def test_a_picture_comes_back_from_its_file(tmp_path: Path) -> None:
     save_png(tmp_path / "folder" / "a.png", Image.fromarray(pixels))
     with Image.open(tmp_path / "folder" / "a.png") as opened:
         assert (np.asarray(opened) == pixels).all()
+
+
+def test_a_picture_is_read_exactly_where_it_is_linear_and_its_edge_holds_beyond() -> None:
+    y, x = np.mgrid[:4, :5] + 0.5  # values at pixel centres are their positions
+    picture = np.stack((x, y), axis=-1)
+    inside = np.array([[0.5, 0.5], [2.2, 3.1], [4.5, 1.75]])
+    np.testing.assert_allclose(read_bilinear(picture, inside), inside, atol=1e-12)
+    np.testing.assert_allclose(
+        read_bilinear(picture, np.array([[-3.0, 9.0], [0.1, 2.0]])), [[0.5, 3.5], [0.5, 2.0]]
+    )

@@ -17,26 +17,16 @@ from charnerf.data.characters import (
     write_character,
 )
 from charnerf.errors import DataError
-from charnerf.geometry.cameras import cameras_towards, direction_from_angles, fibonacci_hemisphere, pixel_rays
+from charnerf.geometry.cameras import fibonacci_hemisphere, pixel_rays
+from charnerf.geometry.framing import framing_cameras, source_cameras
 
-CENTRE = torch.tensor((0.0, 0.0, 1.0), dtype=torch.float64)
 SIZE = 8
 
 
 def make_pictures(depth=True):
     rng = np.random.default_rng(0)
-    targets = cameras_towards(
-        fibonacci_hemisphere(4), target=CENTRE, distance=4.0, half_extent=1.2, size=SIZE, orthographic=False
-    )
-    azimuths = torch.tensor((0.0, 90.0, 180.0), dtype=torch.float64)
-    sources = cameras_towards(
-        direction_from_angles(azimuths, torch.zeros_like(azimuths)),
-        target=CENTRE,
-        distance=4.0,
-        half_extent=1.2,
-        size=SIZE,
-        orthographic=True,
-    )
+    targets = framing_cameras(fibonacci_hemisphere(4), radius=1.2, size=SIZE)
+    sources = source_cameras(radius=1.2, size=SIZE)
     return CharacterPictures(
         cameras=targets,
         images=rng.integers(0, 256, (4, SIZE, SIZE, 4), dtype=np.uint8),

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from charnerf.data.characters import CharacterPictures, write_character
 from charnerf.data.layout import add_to_split
-from charnerf.geometry import framing
 from charnerf.geometry.cameras import (
+    direction_from_angles,
     fibonacci_hemisphere,
     pixel_centres,
     pixel_rays,
@@ -148,7 +148,9 @@ def source_cameras(
     azimuths: tuple[float, ...] = (0.0, 90.0, 180.0), *, size: int = SIZE, orthographic: bool = True
 ) -> Cameras:
     """Level cameras (V,) around the character, float32."""
-    cameras = framing.source_cameras(azimuths, radius=HALF_EXTENT, size=size, orthographic=orthographic)
+    angles = torch.tensor(azimuths, dtype=torch.float64)
+    directions = direction_from_angles(angles, torch.zeros_like(angles))
+    cameras = framing_cameras(directions, radius=HALF_EXTENT, size=size, orthographic=orthographic)
     return cameras.to(torch.float32)
 
 

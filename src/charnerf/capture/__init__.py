@@ -1,1 +1,1 @@
-"""From meshes to data sets: loading, pictures by Embree, embedded characters."""
+"""From meshes to data sets: loading, pictures, variants, embedded characters."""

@@ -1,1 +1,1 @@
-"""Textured triangles: mesh files, surfaces, rays that hit them, colour."""
+"""Textured triangles: mesh files, surfaces, rays that hit them, pictures, colour."""

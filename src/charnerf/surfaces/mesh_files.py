@@ -1,10 +1,8 @@
 """mesh/ of a character: OBJ, MTL and PNG files in the world frame, written and read.
 
-Own dialect of OBJ, which other programs read too: every `v` carries x y z and an sRGB colour, every `usemtl`
-begins a part;
-Kd is sRGB; a factor on a texture is multiplied into its picture; a picture with alpha cuts out below one
-half.
-Mind that the axes are the world's (Z up, facing -Y), where most programs take OBJ as Y up.
+Own dialect of OBJ, which other programs read too: every `v` carries x y z and an sRGB colour, every `usemtl` begins a
+part; Kd is sRGB; a factor on a texture is multiplied into its picture; a picture with alpha cuts out below one half. Mind
+that the axes are the world's (Z up, facing -Y), where most programs take OBJ as Y up.
 """
 
 from pathlib import Path

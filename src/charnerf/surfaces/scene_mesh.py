@@ -1,11 +1,8 @@
 """From a trimesh scene to a SurfaceMesh: which colours mean what.
 
-Colours are taken as glTF means them: textures sRGB, factors and vertex or face colours linear. A geometry
-whose
-metadata holds COLORS_KEY = "srgb" has vertex or face colours that are sRGB-encoded (PLY, OBJ, STL). The
-diffuse colour of
-a SimpleMaterial (MTL's Kd) is sRGB and gives way to its texture, as the programs that write such files mean
-it.
+Colours are taken as glTF means them: textures sRGB, factors and vertex or face colours linear. A geometry whose metadata
+holds COLORS_KEY = "srgb" has vertex or face colours that are sRGB-encoded (PLY, OBJ, STL). The diffuse colour of a
+SimpleMaterial (MTL's Kd) is sRGB and gives way to its texture, as the programs that write such files mean it.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """A textured triangle soup: what capture traces, what lies in mesh/, and what surface points are drawn from.
 
-Letters: M triangles, K points on them. A point on a triangle is given by the weights (u, v) of its second
-    and third corner.
+Letters: M triangles, K points on them. A point on a triangle is given by the weights (u, v) of its second and third
+corner.
 """
 
 from dataclasses import dataclass
