@@ -15,14 +15,14 @@ from docs.figures.meshes import lods, meshes
 from docs.figures.numerics import kernels, trained
 from docs.figures.options import groups, options
 from docs.figures.scores import azimuths, course, measured, scores, seconds, table2
-from docs.figures.sources import BENCH, ROOT, cell, read, speed, table, value
+from docs.figures.sources import BENCH, ROOT, read, speed, table, value
 from docs.figures.weights import weights
 
-SINGLE = (value, cell, table)
+PLAIN = (value, table)
 OF_CHARACTERS = (splits, licences, credits)
 OF_EVALUATIONS = (scores, measured, seconds, azimuths, course, table2, lods, meshes)
 OTHERS = (groups, options, kernels, trained, speed, weights)
-KINDS = {kind.__name__: kind for kind in (*SINGLE, *OF_CHARACTERS, *OF_EVALUATIONS, *OTHERS)}
+KINDS = {kind.__name__: kind for kind in (*PLAIN, *OF_CHARACTERS, *OF_EVALUATIONS, *OTHERS)}
 
 
 def pages() -> list[Path]:

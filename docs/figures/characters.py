@@ -11,7 +11,7 @@ LICENCES = {
     "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/",
     "CC-BY-3.0": "https://creativecommons.org/licenses/by/3.0/",
     "CC-BY-2.0": "https://creativecommons.org/licenses/by/2.0/",
-    "CC-BY": "https://creativecommons.org/licenses/by/4.0/",
+    "CC-BY": "https://creativecommons.org/licenses/",
     "MIT": "https://opensource.org/license/mit",
     "BSD-3-Clause": "https://opensource.org/license/bsd-3-clause",
     "Apache-2.0": "https://www.apache.org/licenses/LICENSE-2.0",
@@ -27,11 +27,10 @@ def characters() -> list[dict[str, str]]:
 def splits() -> str:
     """Characters and families by split, with the digest of the split's source views."""
     every = characters()
-    digests = dict(read("docs/digests.csv")[1:])
     rows = []
-    for split in dict.fromkeys(one["split"] for one in every):
+    for split, digest in read("docs/digests.csv")[1:]:
         inside = [one for one in every if one["split"] == split]
-        rows.append([split, len(inside), len({one["family"] for one in inside}), f"`{digests[split]}`"])
+        rows.append([split, len(inside), len({one["family"] for one in inside}), f"`{digest}`"])
     return markdown(["split", "characters", "families", "digest"], rows)
 
 

@@ -25,7 +25,7 @@ def written(text: str, kinds: Mapping[str, Kind]) -> str:
     Raises:
         ValueError: If a mark is not closed, or names no kind.
     """
-    if len(_MARKED.findall(text)) != text.count("<!-- figures:") or "<!-- figures:" in _between(text):
+    if len(_MARKED.findall(text)) != text.count("<!-- figures:"):
         raise ValueError("found a mark without its end, expected '<!-- end -->' after each.")
 
     def write(found: re.Match[str]) -> str:
@@ -37,11 +37,6 @@ def written(text: str, kinds: Mapping[str, Kind]) -> str:
         return f"<!-- figures: {found['call']} -->{new}<!-- end -->"
 
     return _MARKED.sub(write, text)
-
-
-def _between(text: str) -> str:
-    """What stands between marks and their ends, all of it."""
-    return "".join(found["old"] for found in _MARKED.finditer(text))
 
 
 def typed(text: str) -> list[str]:

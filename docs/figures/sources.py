@@ -33,12 +33,6 @@ def value(file: str, key: str, form: str = "") -> str:
     return format(found, form).replace("%", " %")
 
 
-def cell(file: str, row: str, column: str) -> str:
-    """One cell of a CSV file, as it stands there; rows are named by their first cell."""
-    header, *rows = read(file)
-    return str(next(one for one in rows if one[0] == row)[header.index(column)])
-
-
 def table(file: str) -> str:
     """A CSV file as a table; the best numbers of columns with an arrow are bold."""
     header, *rows = read(file)

@@ -63,7 +63,6 @@ def test_values_are_looked_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "a.csv").write_text("row,PSNR ↑,steps\nours,20.5,7\ntheirs,19,9\n")
     assert sources.value("a.json", "parts/name=two/share", ".0%") == "50 %"
     assert sources.value("a.json", "parts/0/name") == "one"
-    assert sources.cell("a.csv", "theirs", "PSNR ↑") == "19"
     assert sources.table("a.csv").splitlines()[2:] == ["| ours | **20.5** | 7 |", "| theirs | 19 | 9 |"]
 
 
