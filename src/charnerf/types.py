@@ -208,18 +208,18 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """What an adaptive renderer was asked for, what it believes to have kept, and what it did.
+    """What error an adaptive renderer was allowed, what it believes to have made, and what it did.
 
     Attributes:
-        asked: Largest error of a colour asked for.
+        tolerance: Largest error of a colour that was allowed.
         estimated: Estimated error of each ray's colour, (...).
         num_samples: Densities evaluated.
         num_colors: Colours evaluated.
         num_stopped: Rays whose far part was left out because what lies before is opaque.
-        num_unresolved: Rays whose estimate stayed above what was asked.
+        num_unresolved: Rays whose estimate stayed above the tolerance.
     """
 
-    asked: float
+    tolerance: float
     estimated: Tensor
     num_samples: int
     num_colors: int

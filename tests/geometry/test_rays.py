@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from charnerf.geometry.rays import box_interval, occupied_to_t, points_along
+from charnerf.geometry.rays import OccupiedLength, box_interval, points_along
 from charnerf.types import RayBundle
 
 SETTINGS = settings(deadline=None, max_examples=60, database=None, derandomize=True)
@@ -100,7 +100,7 @@ def test_occupied_to_t_against_a_loop(seed, occupied, share):
     flags = torch.tensor(occupied)
     total = float((lengths * flags).sum())
     s_vals = torch.tensor(sorted(share), dtype=torch.float64) * total
-    found = occupied_to_t(t_edges[None], flags[None], s_vals[None])[0]
+    found = OccupiedLength.of(t_edges[None], flags[None]).t_vals(s_vals[None])[0]
     for s, t in zip(s_vals.tolist(), found.tolist(), strict=True):
         expected = by_loop(t_edges.tolist(), occupied, s)
         if abs(t - expected) > 1e-9:  # on an edge, the end of one step and the start of the next are one s
@@ -120,7 +120,7 @@ def test_occupied_to_t_by_hand():
     occupied = torch.tensor(((True, False, True), (False, False, False)))
     s_vals = torch.tensor(((0.25, 1.5, 2.0), (0.0, 0.0, 0.0)))
     torch.testing.assert_close(
-        occupied_to_t(t_edges, occupied, s_vals), torch.tensor(((2.25, 4.5, 5.0), (2.0, 2.0, 2.0)))
+        OccupiedLength.of(t_edges, occupied).t_vals(s_vals), torch.tensor(((2.25, 4.5, 5.0), (2.0, 2.0, 2.0)))
     )
 
 
@@ -128,4 +128,4 @@ def test_no_rays_at_all():
     none = RayBundle(torch.zeros(0, 3), torch.zeros(0, 3))
     assert box_interval(none, *corners(torch.float32))[0].shape == (0,)
     flags = torch.zeros(0, 4, dtype=torch.bool)
-    assert occupied_to_t(torch.zeros(0, 5), flags, torch.zeros(0, 3)).shape == (0, 3)
+    assert OccupiedLength.of(torch.zeros(0, 5), flags).t_vals(torch.zeros(0, 3)).shape == (0, 3)

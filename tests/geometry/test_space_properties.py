@@ -19,7 +19,7 @@ from charnerf.geometry.cameras import (
     to_camera_frame,
 )
 from charnerf.geometry.hull import hull_contains, occupied_edges
-from charnerf.geometry.rays import box_interval, occupied_to_t, points_along
+from charnerf.geometry.rays import OccupiedLength, box_interval, points_along
 from charnerf.types import Cameras, Hull, RayBundle
 
 SETTINGS = settings(deadline=None, max_examples=40, database=None, derandomize=True)
@@ -151,7 +151,7 @@ def test_occupied_length_maps_into_occupied_steps(seed, steps, share, double):
     occupied = torch.rand(8, steps, generator=generator) < share
     total = (torch.diff(t_edges, dim=-1) * occupied).sum(-1, keepdim=True)
     s_vals = total * ((torch.arange(9, dtype=dtype) + 0.5) / 9)
-    t_vals = occupied_to_t(t_edges, occupied, s_vals)
+    t_vals = OccupiedLength.of(t_edges, occupied).t_vals(s_vals)
     assert t_vals.diff(dim=-1).ge(-1e-5).all() and t_vals.isfinite().all()
     slack = 1e-4
     inside = (t_vals[..., None] >= t_edges[:, None, :-1] - slack) & (

@@ -80,7 +80,7 @@ def test_the_true_error_stays_within_the_tolerance(name, tolerance):
     with torch.no_grad():
         rendering = adaptive(tolerance).render(scene, rays)
         error = (rendering.finest.rgb - converged(scene, rays)).abs().amax(-1)
-    assert rendering.estimate is not None and rendering.estimate.asked == tolerance
+    assert rendering.estimate is not None and rendering.estimate.tolerance == tolerance
     assert rendering.estimate.num_unresolved == int((rendering.estimate.estimated > tolerance).sum())
     assert error.max() <= tolerance
 

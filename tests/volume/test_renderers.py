@@ -11,8 +11,9 @@ from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.geometry.hull import hull_contains
 from charnerf.scene import FunctionField, Scene
 from charnerf.types import FieldOutput, Hull, RayBundle
+from charnerf.volume.marching import points_in_memory
 from charnerf.volume.quadrature import PiecewiseConstant, PiecewiseLinear
-from charnerf.volume.renderers.base import AbstractRenderer, chunk_size
+from charnerf.volume.renderers.base import AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 from support import helpers, tiny_models
@@ -124,7 +125,7 @@ def test_chunks_change_nothing(person_scene, kind):
     with torch.no_grad():
         whole = renderer(kind, memory_mib=1024).render(scene, rays)
         pieces = renderer(kind, memory_mib=1).render(replace(scene, coarse=coarse), rays)
-    assert len(sizes) > 1 and max(sizes) <= chunk_size(1, scene.coarse.bytes_per_point)
+    assert len(sizes) > 1 and max(sizes) <= points_in_memory(scene.coarse, 1)
     for name in ("rgb", "opacity", "depth"):
         torch.testing.assert_close(
             getattr(pieces.finest, name), getattr(whole.finest, name), atol=1e-5, rtol=1e-5

@@ -60,7 +60,7 @@ class Measured:
             numbers["left_out"] = self.left_out.shares()
         if self.estimate is not None:
             numbers["tolerance"] = {
-                "asked": self.estimate.asked,
+                "asked": self.estimate.tolerance,
                 "estimated": float(self.estimate.estimated.amax()),
                 "true": self.max_error,
                 "densities": self.estimate.num_samples,

@@ -16,15 +16,13 @@ from charnerf.data.characters import Character
 from charnerf.errors import DataError
 from charnerf.evaluation.frames import fixed_views
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
-from charnerf.geometry.rays import occupied_to_t, points_along
-from charnerf.geometry.sampling import stratified_t_vals
-from charnerf.meshing.density_grid import densities_inside
 from charnerf.models.charnerf import CharNeRF
 from charnerf.scene import Scene
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.raycast import RayCaster
 from charnerf.types import RayBundle, TensorRecord
 from charnerf.volume.compositing import expected_depth, weights_from_densities
+from charnerf.volume.marching import coarse_samples, densities_inside
 from charnerf.volume.renderers.base import AbstractRenderer
 
 RAY_WEIGHTS_FILE = "ray_weights.json"
@@ -206,20 +204,17 @@ def _measured(
     """Weights along rays (R,) that meet the mesh at truth (R,), m; those that the field lets through are left out."""
     seen = renderer.occupied(scene, rays)
     inside = (seen.length > 0).nonzero()[:, 0]
-    seen, truth = seen.take(inside), truth[inside]
-    s_vals = stratified_t_vals(torch.zeros_like(seen.length), seen.length, num_samples)
-    t_vals = occupied_to_t(seen.t_edges, seen.occupied, s_vals)
-    points = points_along(seen.rays, t_vals)
-    dirs = seen.rays.directions[:, None].expand_as(points).reshape(-1, 3)
-    densities = densities_inside(scene, points.reshape(-1, 3), dirs).reshape(t_vals.shape)
-    weights, _ = weights_from_densities(densities, (seen.length[:, None] / num_samples).expand_as(t_vals))
+    seen, truth = seen[inside], truth[inside]
+    samples = coarse_samples(scene.bounds, seen, num_samples)
+    densities = densities_inside(scene.field, samples.points, samples.view_dirs, samples.inside)
+    weights, _ = weights_from_densities(densities, samples.s_edges.diff(dim=-1))
     opaque = weights.sum(-1) > OPAQUE
-    weights, t_vals, truth = weights[opaque], t_vals[opaque], truth[opaque]
+    weights, t_vals, truth = weights[opaque], samples.t_vals[opaque], truth[opaque]
     first = seen.occupied.to(torch.int8).argmax(-1, keepdim=True)
     entry = seen.t_edges.gather(-1, first)[:, 0][opaque]
     return _OpaqueRays(
         entropy=normalised_entropy(weights),
-        depth=expected_depth(weights, t_vals, seen.t_edges[:, -1][opaque]),
+        depth=expected_depth(weights, t_vals, seen.far[opaque]),
         truth=truth,
         hull=entry if scene.bounds.hull is not None else torch.full_like(entry, torch.nan),
         histogram=_histogram(weights, t_vals - truth[:, None]),

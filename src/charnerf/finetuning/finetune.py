@@ -229,7 +229,7 @@ class _Run:
         """Mean error of some rays, each with its weight."""
         index = torch.randint(len(targets), (count,), generator=self.generator).to(targets.alpha.device)
         rgb, opacity = render_cached(self.network.finest, self.renderer, targets.cached, index)
-        self.num_answers += int(targets.cached.placed.inside[index].sum())
+        self.num_answers += int(targets.cached.samples.inside[index].sum())
         errors = self._errors(rgb, opacity, targets.rgb[index], targets.alpha[index])
         return (targets.weights[index] * errors).mean()
 

@@ -84,13 +84,13 @@ def prepare_rays(
     """
     generator = torch.Generator().manual_seed(recipe.seed)
     rays, rgb, alpha, held = _drawn_rays(views, recipe)
-    placed, hit = place(renderer, scene, rays, generator)
+    samples, hit = place(renderer, scene, rays, generator)
     rgb, alpha, held = rgb[hit], alpha[hit], held[hit]
-    most = within_memory(placed, field, 0.75 * recipe.memory_mib)
+    most = within_memory(samples, field, 0.75 * recipe.memory_mib)
     kept = torch.randperm(len(hit), generator=generator)[:most].sort().values.to(hit.device)
-    inside = int(placed.inside[kept].sum())
+    inside = int(samples.inside[kept].sum())
     drawn = len(rays.origins)
-    total = drawn * placed.s_vals.shape[1]
+    total = drawn * samples.s_vals.shape[1]
     left_out = LeftOut(
         rays=drawn - len(kept),
         rays_of=drawn,
@@ -99,7 +99,7 @@ def prepare_rays(
     )
 
     def targets(index: Tensor) -> Targets:
-        return Targets(cache(field, placed[index]), rgb[index], alpha[index], torch.ones_like(alpha[index]))
+        return Targets(cache(field, samples[index]), rgb[index], alpha[index], torch.ones_like(alpha[index]))
 
     trusted, guard = (
         _answered(field, renderer, scene, cameras, count, generator)
@@ -176,8 +176,8 @@ def _answered(
     )
     hit = (renderer.occupied(scene, rays).length > 0).nonzero()[:, 0].cpu()
     drawn = hit[torch.randperm(len(hit), generator=generator)[:count]].to(device)
-    placed, _ = place(renderer, scene, rays[drawn], generator)
-    cached = cache(field, placed)
+    samples, _ = place(renderer, scene, rays[drawn], generator)
+    cached = cache(field, samples)
     rgb, alpha = render_all(field.field, renderer, cached)
     return Targets(cached, rgb, alpha, (alpha > OPAQUE).to(alpha.dtype))
 

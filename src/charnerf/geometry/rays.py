@@ -1,9 +1,11 @@
 """Rays against boxes, and the coordinate that runs along the occupied part of a ray only."""
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
-from charnerf.types import RayBundle
+from charnerf.types import RayBundle, TensorRecord
 
 
 def points_along(rays: RayBundle, t_vals: Tensor) -> Tensor:
@@ -40,22 +42,34 @@ def box_interval(rays: RayBundle, box_min: Tensor, box_max: Tensor) -> tuple[Ten
     return torch.where(hit, near, zero), torch.where(hit, leave, zero)
 
 
-def occupied_to_t(t_edges: Tensor, occupied: Tensor, s_vals: Tensor) -> Tensor:
-    """Map arc length along the occupied steps of a ray to distance along the ray.
+@dataclass(frozen=True)
+class OccupiedLength(TensorRecord):
+    """The coordinate `s` that runs along the occupied steps of rays only, from 0 to their total length, m.
 
-    Args:
-        t_edges: Edges of the steps, (R, N + 1), m, ascending.
-        occupied: Which steps count, (R, N), bool.
-        s_vals: Occupied arc length, (R, S), m, in [0, total occupied length].
-
-    Returns:
-        t_vals, (R, S), m. A ray without occupied steps maps to its first edge.
+    Attributes:
+        t_starts: Where each step begins, (R, N), m along the ray.
+        s_starts: Occupied length before each step, (R, N), m.
+        s_ends: Occupied length up to the end of each, (R, N), m.
+        last: The last occupied step, (R, 1).
     """
-    lengths = torch.diff(t_edges, dim=-1) * occupied
-    cumulated = lengths.cumsum(-1)
-    last = torch.where(occupied, torch.arange(occupied.shape[-1], device=occupied.device), 0).amax(
-        -1, keepdim=True
-    )
-    step = torch.minimum(torch.searchsorted(cumulated, s_vals.contiguous(), right=True), last)
-    before = torch.gather(cumulated - lengths, -1, step)
-    return torch.gather(t_edges, -1, step) + (s_vals - before).clamp_min(0.0)
+
+    t_starts: Tensor
+    s_starts: Tensor
+    s_ends: Tensor
+    last: Tensor
+
+    @classmethod
+    def of(cls, t_edges: Tensor, occupied: Tensor) -> "OccupiedLength":
+        """The coordinate of rays whose steps have edges t_edges (R, N + 1), m, ascending; which count, occupied (R, N)."""
+        lengths = torch.diff(t_edges, dim=-1) * occupied
+        ends = lengths.cumsum(-1)
+        steps = torch.arange(occupied.shape[-1], device=occupied.device)
+        last = torch.where(occupied, steps, 0).amax(-1, keepdim=True)
+        return cls(t_edges[:, :-1], ends - lengths, ends, last)
+
+    def t_vals(self, s_vals: Tensor) -> Tensor:
+        """Distances (R, S), m, along the rays of occupied lengths s_vals (R, S), m; of a ray without any, its start."""
+        step = torch.minimum(torch.searchsorted(self.s_ends, s_vals.contiguous(), right=True), self.last)
+        return torch.gather(self.t_starts, -1, step) + (
+            s_vals - torch.gather(self.s_starts, -1, step)
+        ).clamp_min(0.0)

@@ -19,6 +19,7 @@ from charnerf.geometry.framing import LEAST_DISTANCE
 from charnerf.geometry.safe import safe_normalize
 from charnerf.scene import Scene
 from charnerf.types import LeftOut
+from charnerf.volume.marching import densities_inside
 
 CHUNK = 8192  # points evaluated at once; larger batches leave the caches
 MIDDLE_LEVEL = 20.0  # 1/m; where interpolation between grid points is most faithful
@@ -62,16 +63,6 @@ class DensityGrid:
         return density_at
 
 
-def densities_inside(scene: Scene, points: Tensor, *view_dirs: Tensor) -> Tensor:
-    """Densities (P,), 1/m, of points (P, 3): the mean over view_dirs, (P, 3) each; zero outside the hull, unevaluated."""
-    inside = scene.bounds.may_hold(points).nonzero()[:, 0]
-    densities = points.new_zeros(len(points))
-    for part in inside.split(CHUNK):
-        answers = [scene.field.densities(points[part], dirs[part]).densities for dirs in view_dirs]
-        densities[part] = torch.stack(answers).mean(0)
-    return densities
-
-
 def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
     """Density averaged over cameras around the character.
 
@@ -93,7 +84,9 @@ def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
     if scene.field.sees_directions:
         positions = camera_positions(scene, num_cameras).to(points)
         view_dirs = [safe_normalize(points - position) for position in positions]
-    densities = densities_inside(scene, points, *view_dirs)
+    inside = scene.bounds.may_hold(points)
+    answers = [densities_inside(scene.field, points, dirs, inside) for dirs in view_dirs]
+    densities = torch.stack(answers).mean(0)
     if not bool(densities.isfinite().all()):
         bad = int((~densities.isfinite()).sum())
         raise NumericalError(

@@ -7,8 +7,8 @@ import torch
 import trimesh
 
 from charnerf.errors import NumericalError
-from charnerf.meshing.density_grid import CHUNK
 from charnerf.scene import Scene
+from charnerf.volume.marching import in_chunks, points_at_once
 
 
 @torch.no_grad()
@@ -29,9 +29,8 @@ def field_colors(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.nd
     device = scene.bounds.box_min.device
     where = torch.tensor(np.asarray(points), dtype=torch.float32, device=device)
     outward = torch.tensor(np.asarray(normals), dtype=torch.float32, device=device)
-    parts = zip(where.split(CHUNK), outward.split(CHUNK), strict=True)
-    colors = [scene.field(here, -normal).rgb for here, normal in parts]
-    rgb = torch.cat([where.new_zeros(0, 3), *colors]).double().cpu().numpy()
+    answer = in_chunks(scene.field, where, -outward, points_at_once(scene.field))
+    rgb = answer.rgb.double().cpu().numpy()
     if not np.isfinite(rgb).all():
         raise NumericalError(
             f"colours: found {int((~np.isfinite(rgb)).sum())} of {rgb.size} values not finite, "

@@ -17,9 +17,10 @@ from torch.nn import functional as F
 
 from charnerf.geometry.cameras import pixel_rays, project_into_all
 from charnerf.geometry.rays import box_interval, points_along
-from charnerf.meshing.density_grid import DensityGrid, densities_inside
+from charnerf.meshing.density_grid import DensityGrid
 from charnerf.scene import Scene
 from charnerf.types import Cameras, SourceViews
+from charnerf.volume.marching import densities_inside
 
 MASK_ALPHA = 0.5
 ABOVE = 1.1  # of the level: where the densest place of a ray is brought to; what is 0.91 times as dense is inside then
@@ -90,8 +91,9 @@ def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sur
         points = points_along(rays[part], t)
         unsure = (coarse_density(points).amax(-1) < sure).nonzero()[:, 0]
         dirs = rays.directions[part[unsure], None].expand(-1, num, -1)
-        densities = densities_inside(scene, points[unsure].reshape(-1, 3), dirs.reshape(-1, 3))
-        peaks[part[unsure]] = densities.view(-1, num).amax(-1)
+        points = points[unsure]
+        densities = densities_inside(scene.field, points, dirs, scene.bounds.may_hold(points))
+        peaks[part[unsure]] = densities.amax(-1)
     return peaks
 
 

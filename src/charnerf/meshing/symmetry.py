@@ -9,9 +9,9 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.bounds import Bounds
-from charnerf.meshing.density_grid import densities_inside
 from charnerf.scene import AbstractField, DensityOutput, Scene
 from charnerf.types import FieldOutput, Hull, TensorRecord
+from charnerf.volume.marching import densities_inside
 
 OTHER_SIDE = 0.01  # weight of the mirrored side's colour: it counts only where the own side is empty
 
@@ -69,8 +69,10 @@ class SymmetricField(AbstractField):
 
     def densities(self, points: Tensor, view_dirs: Tensor) -> DensityOutput:
         """Densities (P,); colours are asked for by point."""
+        field, bounds = self.scene.field, self.scene.bounds
         own, other = (
-            densities_inside(self.scene, p, d) for p, d in ((points, view_dirs), mirrored(points, view_dirs))
+            densities_inside(field, p, d, bounds.may_hold(p))
+            for p, d in ((points, view_dirs), mirrored(points, view_dirs))
         )
         return DensityOutput(0.5 * (own + other), _Points(points, view_dirs))
 

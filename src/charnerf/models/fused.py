@@ -138,8 +138,8 @@ class _SumViews(torch.autograd.Function):
     @once_differentiable  # type: ignore[no-untyped-call, untyped-decorator]
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, ...]:
         weights, features = ctx.saved_tensors
-        shares = torch.stack([(one * grad).sum(-1) for one in features.unbind(1)], dim=1)
-        return shares, grad[:, None] * weights[..., None]
+        to_weights = torch.stack([(one * grad).sum(-1) for one in features.unbind(1)], dim=1)
+        return to_weights, grad[:, None] * weights[..., None]
 
 
 class _PairDots(torch.autograd.Function):
@@ -173,9 +173,9 @@ class _Bags(torch.autograd.Function):
         offsets = torch.searchsorted(
             sorted_rows, torch.arange(ctx.num_rows, dtype=torch.int32, device=grad.device)
         )
-        shares = weights.reshape(-1)[order]
+        factors = weights.reshape(-1)[order]
         readings = order.div_(indices.shape[1], rounding_mode="floor")
-        return F.embedding_bag(readings, grad, offsets, per_sample_weights=shares, mode="sum"), None, None
+        return F.embedding_bag(readings, grad, offsets, per_sample_weights=factors, mode="sum"), None, None
 
 
 def _where_positive_(grad: Tensor, rectified: Tensor) -> Tensor:

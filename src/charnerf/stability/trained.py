@@ -40,8 +40,8 @@ class TrainedField:
 
 
 @dataclass
-class _Witness(AbstractQuadrature):
-    """A quadrature that remembers what it was asked and answered."""
+class _Recorder(AbstractQuadrature):
+    """A quadrature that keeps what it was given and answered."""
 
     inner: AbstractQuadrature
     depths: list[Tensor] = field(default_factory=list)
@@ -100,16 +100,16 @@ def _differs(case: str, picture: Tensor, rest: Tensor, target: Target, bounds: B
 
 def _stiffness(trained: TrainedField, encoded: EncodedViews, target: Target) -> Iterator[CheckRow]:
     """Largest optical depth of an interval, saturated samples, lost light, and what is not finite."""
-    witness = _Witness(trained.renderer.quadrature)
+    recorder = _Recorder(trained.renderer.quadrature)
     renderer = copy(trained.renderer)
-    renderer.quadrature = witness
+    renderer.quadrature = recorder
     picture = _picture(replace(trained, renderer=renderer), encoded)
-    depths = torch.cat(witness.depths)
-    bad = witness.non_finite + count_non_finite(picture)
+    depths = torch.cat(recorder.depths)
+    bad = recorder.non_finite + count_non_finite(picture)
     yield target.row("trained field", "largest sigma * delta", Errors(largest(depths), None, bad), REPORTED)
     saturated = float((depths > SATURATED).double().mean()) if depths.numel() else 0.0
     yield target.row("trained field", "share of samples saturated", Errors(saturated), REPORTED)
-    lost = Errors(largest(torch.cat(witness.lost)), None, bad)
+    lost = Errors(largest(torch.cat(recorder.lost)), None, bad)
     yield target.row("trained field", "weights + transmittance - 1", lost, ROUNDING)
 
 

@@ -5,27 +5,27 @@ until nothing behind can be seen; colours only of samples that count; an estimat
 bins with large errors cut into three, their samples kept, until the estimate is below the tolerance.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import torch
 from torch import Tensor
 
+from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.occupied import candidates, occupied_at, segment_bins
-from charnerf.geometry.rays import box_interval
-from charnerf.scene import AbstractField, Scene
+from charnerf.geometry.rays import OccupiedLength, box_interval
+from charnerf.scene import Scene
 from charnerf.types import (
     ErrorEstimate,
-    FieldOutput,
     LeftOut,
     RayBundle,
     Rendering,
     RenderOutput,
 )
 from charnerf.volume.compositing import expected_depth
+from charnerf.volume.marching import points_in_memory
 from charnerf.volume.quadrature.base import AbstractQuadrature
-from charnerf.volume.renderers.base import WHITE, AbstractRenderer, chunk_size
+from charnerf.volume.renderers.base import WHITE, AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.refinement import (
     Marched,
@@ -39,7 +39,7 @@ from charnerf.volume.renderers.samples import Samples
 SPACING = 0.03  # m: longest bin at the start; no feature of a field read from drawings is much thinner
 MAX_BINS = 128  # of a ray at the start
 UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque surface
-UNCOLORED_SHARE = 0.15  # of the tolerance: light whose colour need not be known
+COLORLESS_SHARE = 0.15  # of the tolerance: light whose colour need not be evaluated
 NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
 RAYS_AT_ONCE = 4096
 POINTS_A_STAGE = 4096  # front to back; fewer would save samples and cost calls
@@ -58,7 +58,7 @@ class AdaptiveRenderer(AbstractRenderer):
         num_fine: As the culled renderer.
         hull_steps: Steps in which the occupied part of a ray is looked up.
         memory_mib: Bound on what is held at once, MiB.
-        tolerance: Largest error of a colour that is asked for, in [0, 1].
+        tolerance: Largest error of a colour that is allowed, in [0, 1].
     """
 
     def __init__(
@@ -71,28 +71,23 @@ class AdaptiveRenderer(AbstractRenderer):
         memory_mib: float,
         tolerance: float,
     ) -> None:
-        super().__init__(
-            quadrature=quadrature,
-            num_coarse=num_coarse,
-            num_fine=num_fine,
-            hull_steps=hull_steps,
-            memory_mib=memory_mib,
-        )
+        settings: dict[str, Any] = {
+            "quadrature": quadrature,
+            "num_coarse": num_coarse,
+            "num_fine": num_fine,
+            "hull_steps": hull_steps,
+            "memory_mib": memory_mib,
+        }
+        super().__init__(**settings)
         self.tolerance = tolerance
-        self._culled = CulledRenderer(
-            quadrature=quadrature,
-            num_coarse=num_coarse,
-            num_fine=num_fine,
-            hull_steps=hull_steps,
-            memory_mib=memory_mib,
-        )
+        self._culled = CulledRenderer(**settings)
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,) to the tolerance; with a generator or gradients as the culled renderer."""
         if generator is not None or torch.is_grad_enabled():
             return self._culled.render(scene, rays, generator)
-        index, near, far = _candidates(scene, rays)
-        block = max(64, min(RAYS_AT_ONCE, chunk_size(self.memory_mib, scene.field.bytes_per_point) // 4))
+        index, near, far = _candidates(scene.bounds, rays)
+        block = max(64, min(RAYS_AT_ONCE, points_in_memory(scene.field, self.memory_mib) // 4))
         with torch.inference_mode():  # spares small operations a tenth; what is returned is made outside
             blocks = [
                 self._render_block(scene, rays[index[i : i + block]], near[i : i + block], far[i : i + block])
@@ -102,33 +97,32 @@ class AdaptiveRenderer(AbstractRenderer):
 
     def _render_block(self, scene: Scene, rays: RayBundle, near: Tensor, far: Tensor) -> "_Block":
         """Render some rays (R,) between near and far (R,), m."""
-        ways = _ways(scene, rays, near, far, self.hull_steps)
-        samples = Samples(scene, rays, chunk_size(self.memory_mib, scene.field.bytes_per_point))
-        s_edges, begins = segment_bins(ways.occupied, ways.t_edges.diff(dim=-1), SPACING, MAX_BINS)
-        numbers = self._first_samples(samples, ways, s_edges)
+        t_edges, occupied = _steps(scene.bounds, rays, near, far, self.hull_steps)
+        along = OccupiedLength.of(t_edges, occupied)
+        samples = Samples(scene, rays, self._chunk(scene.field))
+        s_edges, begins = segment_bins(occupied, t_edges.diff(dim=-1), SPACING, MAX_BINS)
+        widths, t_vals = s_edges.diff(dim=-1), along.t_vals(_middles(s_edges))
+        bins = _Bins(begins, widths, t_vals, self._first_samples(samples, t_vals, widths))
         block = _Block.empty(rays, far, samples)
         rows = torch.arange(len(near), device=near.device)
         for round_ in range(MAX_ROUNDS + 1):
-            done, errors = self._compose(
-                block, rows, ways, s_edges, begins, numbers, last=round_ == MAX_ROUNDS
-            )
-            going = (~done).nonzero()[:, 0]
-            if len(going) == 0:
+            done, errors = self._compose(block, rows, bins, last=round_ == MAX_ROUNDS)
+            left = (~done).nonzero()[:, 0]
+            if len(left) == 0:
                 break
-            rows = rows[going]
+            rows, along = rows[left], along[left]
             split = split_bins(
-                s_edges[going], begins[going], errors[going], NUM_SPLIT, 0.1 * self.tolerance / NUM_SPLIT
+                s_edges[left], begins[left], errors[left], NUM_SPLIT, 0.1 * self.tolerance / NUM_SPLIT
             )
-            kept = torch.where(split.source >= 0, numbers[going].gather(1, split.source.clamp_min(0)), -1)
+            kept = torch.where(split.source >= 0, bins.numbers[left].gather(1, split.source.clamp_min(0)), -1)
             s_edges, begins = split.s_edges, split.begins
-            wanted = (split.source < 0) & (s_edges.diff(dim=-1) > 0)
-            new = samples.add(rows, ways.t_vals(rows, _middles(s_edges)), wanted)
-            numbers = torch.where(wanted, new, kept)
+            widths, t_vals = s_edges.diff(dim=-1), along.t_vals(_middles(s_edges))
+            wanted = (split.source < 0) & (widths > 0)
+            bins = _Bins(begins, widths, t_vals, torch.where(wanted, samples.add(rows, t_vals, wanted), kept))
         return block
 
-    def _first_samples(self, samples: Samples, ways: "_Ways", s_edges: Tensor) -> Tensor:
-        """Evaluate the middles of bins front to back, until what lies behind can not be seen; numbers (R, K)."""
-        widths, t_vals = s_edges.diff(dim=-1), ways.t_vals(None, _middles(s_edges))
+    def _first_samples(self, samples: Samples, t_vals: Tensor, widths: Tensor) -> Tensor:
+        """Evaluate the middles of bins (R, K), so wide, front to back, until what lies behind can not be seen; numbers (R, K)."""
         numbers = torch.full_like(widths, -1, dtype=torch.long)
         light = torch.ones_like(widths[:, 0])
         start = 0
@@ -140,38 +134,26 @@ class AdaptiveRenderer(AbstractRenderer):
             some = widths[rows, columns]
             if not bool((some > 0).any()):
                 break
-            found = samples.add(rows, t_vals[rows, columns], some > 0)
-            numbers[rows, columns] = found
-            light[rows] *= torch.exp(-(samples.densities(found) * some).sum(-1))
+            added = samples.add(rows, t_vals[rows, columns], some > 0)
+            numbers[rows, columns] = added
+            light[rows] *= torch.exp(-(samples.densities(added) * some).sum(-1))
             start = columns.stop
         return numbers
 
-    def _compose(
-        self,
-        block: "_Block",
-        rows: Tensor,
-        ways: "_Ways",
-        s_edges: Tensor,
-        begins: Tensor,
-        numbers: Tensor,
-        *,
-        last: bool,
-    ) -> tuple[Tensor, Tensor]:
+    def _compose(self, block: "_Block", rows: Tensor, bins: "_Bins", *, last: bool) -> tuple[Tensor, Tensor]:
         """Composite rays by row, note those that are accurate enough, (r,) bool, and answer the errors of bins (r, K)."""
-        widths = s_edges.diff(dim=-1)
+        numbers, widths = bins.numbers, bins.widths
         densities = block.samples.densities(numbers)
         before, after = light_before(densities * widths)
-        heavy = heavy_weights(before - after, UNCOLORED_SHARE * self.tolerance)
-        rgb, known = block.samples.colors(numbers, (numbers >= 0) & heavy)
-        marched = march(densities, rgb, known, widths, begins, WHITE)
+        wanted = (numbers >= 0) & heavy_weights(before - after, COLORLESS_SHARE * self.tolerance)
+        rgb, colored = block.samples.colors(numbers, wanted)
+        marched = march(densities, rgb, colored, widths, bins.begins, WHITE)
         stopped = ((numbers < 0) & (widths > 0)).any(-1)
         left = torch.where(stopped, after[:, -1], 0.0)
         estimated = marched.errors.square().sum(-1).sqrt() + marched.unseen + left
         done = (estimated <= self.tolerance) | last
         finished = done.nonzero()[:, 0]
-        block.note(
-            rows[finished], marched, estimated, finished, ways.t_vals(rows, _middles(s_edges)), stopped
-        )
+        block.note(rows[finished], marched, estimated, finished, bins.t_vals, stopped)
         return done, marched.errors
 
     def _gathered(self, blocks: list["_Block"], index: Tensor, rays: RayBundle) -> Rendering:
@@ -194,7 +176,7 @@ class AdaptiveRenderer(AbstractRenderer):
                 rays=num_rays - used, rays_of=num_rays, samples=total - evaluated, samples_of=total
             ),
             estimate=ErrorEstimate(
-                asked=self.tolerance,
+                tolerance=self.tolerance,
                 estimated=estimated,
                 num_samples=evaluated,
                 num_colors=sum(block.samples.num_colors for block in blocks),
@@ -203,51 +185,24 @@ class AdaptiveRenderer(AbstractRenderer):
             ),
         )
 
-    def _evaluate(
-        self,
-        field: AbstractField,
-        points: Tensor,
-        dirs: Tensor,
-        inside: Tensor,
-        chunk: int,
-        passed: Callable[[Tensor], Tensor],
-    ) -> tuple[FieldOutput, int]:
-        """As the culled renderer."""
-        return self._culled._evaluate(field, points, dirs, inside, chunk, passed)
 
-
-@dataclass(frozen=True)
-class _Ways:
-    """The occupied parts of rays: t_edges (R, N + 1), m, occupied (R, N), occupied length up to each step's end (R, N), m."""
-
-    t_edges: Tensor
-    occupied: Tensor
-    reached: Tensor
-
-    def t_vals(self, rows: Tensor | None, s_vals: Tensor) -> Tensor:
-        """Distances (r, K) along rays by row of occupied lengths s_vals (r, K), m."""
-        chosen = self if rows is None else _Ways(self.t_edges[rows], self.occupied[rows], self.reached[rows])
-        step = torch.searchsorted(chosen.reached, s_vals.contiguous()).clamp_max(chosen.reached.shape[-1] - 1)
-        return chosen.t_edges.gather(-1, step + 1) - (chosen.reached.gather(-1, step) - s_vals)
-
-
-def _ways(scene: Scene, rays: RayBundle, near: Tensor, far: Tensor, num_steps: int) -> _Ways:
-    if scene.bounds.hull is None:
-        t_edges = torch.stack((near, far), dim=-1)
-        return _Ways(t_edges, torch.ones_like(near[:, None], dtype=torch.bool), (far - near)[:, None])
-    hull = scene.bounds.hull
+def _steps(
+    bounds: Bounds, rays: RayBundle, near: Tensor, far: Tensor, num_steps: int
+) -> tuple[Tensor, Tensor]:
+    """Steps between near and far (R,), m: their edges (R, N + 1), m, and which are occupied (R, N)."""
+    hull = bounds.hull
+    if hull is None:
+        return torch.stack((near, far), dim=-1), torch.ones_like(near[:, None], dtype=torch.bool)
     share = torch.linspace(0.0, 1.0, num_steps + 1, dtype=near.dtype, device=near.device)
     t_edges = torch.addcmul(near[:, None], (far - near)[:, None], share)
-    occupied = occupied_at(hull.occupancy, hull, rays, 0.5 * (t_edges[:, 1:] + t_edges[:, :-1]))
-    return _Ways(t_edges, occupied, (t_edges.diff(dim=-1) * occupied).cumsum(-1))
+    return t_edges, occupied_at(hull.occupancy, hull, rays, 0.5 * (t_edges[:, 1:] + t_edges[:, :-1]))
 
 
-def _candidates(scene: Scene, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor]:
+def _candidates(bounds: Bounds, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor]:
     """Rays (R,) that may meet something: index, near and far."""
-    bounds = scene.bounds
     if bounds.hull is not None and bounds.coarse_hull is not None:
-        found = candidates(bounds.hull, bounds.coarse_hull, rays)
-        return found.index, found.near, found.far
+        met = candidates(bounds.hull, bounds.coarse_hull, rays)
+        return met.index, met.near, met.far
     near, far = box_interval(rays, *bounds.tight_box)
     index = (far > near).nonzero()[:, 0]
     return index, near[index], far[index]
@@ -255,6 +210,16 @@ def _candidates(scene: Scene, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor]:
 
 def _middles(s_edges: Tensor) -> Tensor:
     return 0.5 * (s_edges[:, 1:] + s_edges[:, :-1])
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """Bins of rays: which begin a segment (R, K), how wide they are, m, where their middles lie, m, and their samples' numbers."""
+
+    begins: Tensor
+    widths: Tensor
+    t_vals: Tensor
+    numbers: Tensor
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,12 @@
 """Evaluates every sample of every ray and applies the hull afterwards: the reference."""
 
-from collections.abc import Callable
 from typing import final
 
 import torch
-from torch import Tensor
 
 from charnerf.scene import AbstractField, Scene
 from charnerf.types import FieldOutput, LeftOut, RayBundle, Rendering
+from charnerf.volume.marching import RaySamples, in_chunks
 from charnerf.volume.renderers.base import AbstractRenderer
 
 
@@ -17,21 +16,15 @@ class DenseRenderer(AbstractRenderer):
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,), all of them."""
-        finest, coarse, left_out = self._two_passes(scene, self.occupied(scene, rays), generator)
+        seen = self.occupied(scene, rays)
+        finest, coarse, left_out = self._two_passes(scene, seen, generator, self._evaluate)
         return Rendering(
             finest=finest, coarse=coarse, left_out=left_out + LeftOut(rays=0, rays_of=rays.origins.shape[0])
         )
 
-    def _evaluate(
-        self,
-        field: AbstractField,
-        points: Tensor,
-        dirs: Tensor,
-        inside: Tensor,
-        chunk: int,
-        passed: Callable[[Tensor], Tensor],
-    ) -> tuple[FieldOutput, int]:
+    def _evaluate(self, field: AbstractField, samples: RaySamples) -> tuple[FieldOutput, int]:
         """Evaluate all samples, then set the density outside to zero."""
-        answer = self._in_chunks(field, points.reshape(-1, 3), dirs.reshape(-1, 3), chunk)
-        densities = answer.densities.reshape(inside.shape) * inside
-        return FieldOutput(rgb=answer.rgb.reshape(points.shape), densities=densities), inside.numel()
+        points, dirs = samples.points.reshape(-1, 3), samples.view_dirs.reshape(-1, 3)
+        answer = in_chunks(field, points, dirs, self._chunk(field))
+        densities = answer.densities.reshape(samples.inside.shape) * samples.inside
+        return FieldOutput(answer.rgb.reshape(samples.points.shape), densities), samples.inside.numel()

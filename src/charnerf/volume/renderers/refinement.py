@@ -44,37 +44,37 @@ def heavy_weights(weights: Tensor, budget: float) -> Tensor:
 
 
 def march(
-    densities: Tensor, rgb: Tensor, known: Tensor, widths: Tensor, begins: Tensor, background: float
+    densities: Tensor, rgb: Tensor, colored: Tensor, widths: Tensor, begins: Tensor, background: float
 ) -> Marched:
     """Composite rays and estimate the error that each bin makes.
 
     Args:
         densities: (R, K), 1/m.
-        rgb: Colours (R, K, 3), read only where known.
-        known: Bins whose colour was evaluated, (R, K), bool; the light absorbed in the others counts as
+        rgb: Colours (R, K, 3), read only where `colored`.
+        colored: Bins whose colour was evaluated, (R, K), bool; the light absorbed in the others counts as
             having the mean colour
-            of the known ones, and is added to the estimate.
+            of the colored ones, and is added to the estimate.
         widths: Of the bins, (R, K), m; 0 pads.
         begins: Bins that begin a segment of the hull, (R, K): before them the density is another one for a
-            known reason.
+            plain reason.
         background: Colour behind everything.
     """
     depths = densities * widths
     weights, passed = weights_from_optical_depths(depths)
-    seen = (weights * known)[..., None] * rgb
+    seen = (weights * colored)[..., None] * rgb
     shown, opacity = seen.sum(1), weights.sum(-1)
-    counted = (weights * known).sum(-1)
+    counted = (weights * colored).sum(-1)
     unseen = opacity - counted
     total = shown * (opacity / counted.clamp_min(1e-6))[:, None] + background * passed[:, None]
     before, after = light_before(depths)
     behind = ((total[:, None] - seen.cumsum(1)) / after[..., None].clamp_min(1e-4)).clamp(0.0, 1.0)
-    contrast = torch.where(known, (rgb - behind).abs().amax(-1), 1.0)
+    contrast = torch.where(colored, (rgb - behind).abs().amax(-1), 1.0)
     joined = (widths[:, 1:] > 0) & ~begins[:, 1:]  # bin k with k + 1
     jump = _largest_step((densities[:, 1:] - densities[:, :-1]).abs() * joined)
     alone = ~(_either_side(joined))
     jump = torch.where(alone, densities, jump)
     from_density = (before * after).sqrt() * contrast * (DENSITY_SHARE * jump * widths).clamp_max(1.0)
-    step = (rgb[:, 1:] - rgb[:, :-1]).abs().amax(-1) * (joined & known[:, 1:] & known[:, :-1])
+    step = (rgb[:, 1:] - rgb[:, :-1]).abs().amax(-1) * (joined & colored[:, 1:] & colored[:, :-1])
     from_color = COLOR_SHARE * weights * _largest_step(step)
     return Marched(
         rgb=total, opacity=opacity, weights=weights, errors=from_density + from_color, unseen=unseen

@@ -9,9 +9,8 @@ from torch import Tensor
 
 from charnerf.scene import DensityOutput, Scene
 from charnerf.types import RayBundle, TensorRecord
-from charnerf.volume.renderers.base import POINTS_AT_ONCE, points_in_caches
 
-UNKNOWN = 0.5  # colour of samples that nobody asked for
+GREY = 0.5  # of samples whose colour was not wanted
 
 
 class Samples:
@@ -20,26 +19,26 @@ class Samples:
     Args:
         scene: What is looked at.
         rays: Rays (R,).
-        points_at_once: Points of one chunk.
+        size: Points of a chunk.
     """
 
-    def __init__(self, scene: Scene, rays: RayBundle, points_at_once: int) -> None:
+    def __init__(self, scene: Scene, rays: RayBundle, size: int) -> None:
         self.scene = scene
         self.rays = rays
-        self.size = min(points_at_once, POINTS_AT_ONCE, points_in_caches(scene.field.bytes_per_point))
+        self.size = size
         self.num_colors = 0
         self._densities = rays.origins.new_zeros(1)  # the last one stands for "none"
-        self._rgb = rays.origins.new_full((1, 3), UNKNOWN)
-        self._known = torch.zeros(1, dtype=torch.bool, device=rays.origins.device)
+        self._rgb = rays.origins.new_full((1, 3), GREY)
+        self._colored = torch.zeros(1, dtype=torch.bool, device=rays.origins.device)
         self._answers: list[tuple[int, DensityOutput]] = []
 
     def __len__(self) -> int:
-        """Samples whose density is known."""
+        """Samples whose density was evaluated."""
         return len(self._densities) - 1
 
     @property
     def num_evaluated(self) -> int:
-        """Samples that the field was asked for."""
+        """Samples that the field answered."""
         return sum(len(answer.densities) for _, answer in self._answers)
 
     def add(self, rows: Tensor, t_vals: Tensor, wanted: Tensor) -> Tensor:
@@ -57,21 +56,21 @@ class Samples:
         ray = rows[row]
         directions = self.rays.directions[ray]
         points = torch.addcmul(self.rays.origins[ray], directions, t_vals[row, column, None])
-        start, count, found = len(self), len(points), []
+        start, count, densities = len(self), len(points), []
         held = self.scene.bounds.may_hold(points)
-        asked, empty = held.nonzero()[:, 0], (~held).nonzero()[:, 0]
-        for first in range(0, len(asked), self.size):
-            some = asked[first : first + self.size]
+        inside, empty = held.nonzero()[:, 0], (~held).nonzero()[:, 0]
+        for first in range(0, len(inside), self.size):
+            some = inside[first : first + self.size]
             answer = self.scene.field.densities(points[some], directions[some])
             self._answers.append((start + first, answer))
-            found.append(answer.densities)
-        found.append(self._densities.new_zeros(len(empty)))
-        self._densities = torch.cat((self._densities[:-1], *found, self._densities[-1:]))
-        self._rgb = torch.cat((self._rgb[:-1], self._rgb.new_full((count + 1, 3), UNKNOWN)))
-        self._known = torch.cat((self._known[:-1], self._known.new_zeros(count + 1)))
+            densities.append(answer.densities)
+        densities.append(self._densities.new_zeros(len(empty)))
+        self._densities = torch.cat((self._densities[:-1], *densities, self._densities[-1:]))
+        self._rgb = torch.cat((self._rgb[:-1], self._rgb.new_full((count + 1, 3), GREY)))
+        self._colored = torch.cat((self._colored[:-1], self._colored.new_zeros(count + 1)))
         numbers = torch.full_like(wanted, -1, dtype=torch.long)
         order = torch.cat(
-            (asked, empty)
+            (inside, empty)
         )  # no answer holds the colours of the latter: a weight of zero asks for none
         numbers[row[order], column[order]] = torch.arange(start, start + count, device=numbers.device)
         return numbers
@@ -81,8 +80,8 @@ class Samples:
         return self._densities[numbers]
 
     def colors(self, numbers: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
-        """Colours (R, K, 3) of samples by number (R, K), those wanted evaluated if they were not; and which are known."""
-        missing = numbers[wanted & ~self._known[numbers]]
+        """Colours (R, K, 3) of samples by number (R, K), those wanted evaluated if they were not; and which have one."""
+        missing = numbers[wanted & ~self._colored[numbers]]
         if len(missing):
             missing = missing.sort().values
             starts = torch.tensor([start for start, _ in self._answers], device=missing.device)
@@ -92,9 +91,9 @@ class Samples:
             groups = zip(self._answers, missing.split(counts), strict=True)
             parts = [answer.state[group - start] for (start, answer), group in groups if len(group)]
             self._rgb[missing] = self._evaluate(type(parts[0]).joined(parts), len(missing))
-            self._known[missing] = True
+            self._colored[missing] = True
             self.num_colors += len(missing)
-        return self._rgb[numbers], self._known[numbers]
+        return self._rgb[numbers], self._colored[numbers]
 
     def _evaluate(self, state: TensorRecord, count: int) -> Tensor:
         """Colours (count, 3) of parts of answers, in chunks."""
