@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from charnerf.training import run
+from charnerf.training import trainer
 from charnerf.training.cells import read_cell, run_cell
 from support import small_runs
 
@@ -24,7 +24,10 @@ TRAINED = """
     import sys
     from pathlib import Path
     from support import small_runs
+    from charnerf.process import use_fastest_products
     from charnerf.training.cells import run_cell
+
+    use_fastest_products()  # as tests/conftest.py and the doors do: other products round otherwise
 
     def train(cfg, folder):
         small_runs.assemble(cfg, folder).fit()
@@ -79,13 +82,13 @@ def test_a_cell_killed_in_the_middle_ends_as_the_one_that_was_not(figure_dataset
 
 def test_checkpoints_between_validations_resume_the_same_run(figure_dataset, tmp_path, monkeypatch):
     """One validation at the end of the run: what is kept comes from the clock."""
-    monkeypatch.setattr(run, "CHECKPOINT_EVERY", timedelta(microseconds=1))
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", timedelta(microseconds=1))
     settings = ("encoder=single", "scale.steps=8", "validation.times=1")
     cfg = small_runs.smoke_config(figure_dataset, *settings)
     cut = small_runs.assemble(cfg, tmp_path / "cut", cut_at=5)
     with pytest.raises(ConnectionAbortedError):
         cut.fit()
-    monkeypatch.setattr(run, "CHECKPOINT_EVERY", timedelta(hours=1))
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", timedelta(hours=1))
     straight = small_runs.assemble(cfg, tmp_path / "straight").fit()
     resumed = small_runs.assemble(cfg, tmp_path / "resumed").fit(tmp_path / "cut/checkpoints/last.ckpt")
     assert [batch[0] for batch in resumed.recorder.batches] == [5, 6, 7]
