@@ -61,6 +61,7 @@ def test_a_sheet_is_taken_apart(sheet):
     [
         ({"views": ["45"]}, "--view: found '45', expected VIEW=..."),
         ({"views": ["front=x.png"]}, "--view front: found this view twice"),
+        ({"views": ["45=a.png", "45=b.png"]}, "--view 45: found this view twice"),
         ({"views": ["45=gone.png"]}, "--view 45=gone.png: found no such file"),
         ({"order": "front,side,back"}, "--order, --figure: found without a SHEET"),
     ],

@@ -85,7 +85,7 @@ def given_drawings(
     from charnerf.drawings.viewpoints import viewpoint
 
     files = list(files or [])
-    by_view = dict(_split(one, "--view") for one in seen or [])
+    by_view = _pairs(seen, "--view")
     is_sheet = len(files) == 1 and not by_view
     if (order or figures) and not is_sheet:
         raise ConfigError(
@@ -95,9 +95,7 @@ def given_drawings(
         read = read_sheet(
             files[0],
             order=order.split(",") if order else (),
-            figures={
-                name: _number(number) for name, number in (_split(one, "--figure") for one in figures or [])
-            },
+            figures={name: _number(number) for name, number in _pairs(figures, "--figure")},
         )
         for line in (*read.assumptions, *(f"warning: {one}" for one in read.warnings)):
             say(line)
@@ -108,13 +106,23 @@ def given_drawings(
         )
     names = ("front", side_shows, "back")
     drawings = {viewpoint(name): file for name, file in zip(names, files, strict=False)}
-    for name, file in by_view.items():
+    for name, file in by_view:
         if viewpoint(name) in drawings:
             raise ConfigError(f"--view {name}: found this view twice, expected one drawing of it.")
         if not Path(file).is_file():
             raise ConfigError(f"--view {name}={file}: found no such file. Check the path.")
         drawings[viewpoint(name)] = Path(file)
     return GivenDrawings(drawings)
+
+
+def _pairs(texts: Sequence[str] | None, option: str) -> list[tuple[str, str]]:
+    """Views and values of VIEW=VALUE, each view once."""
+    pairs = [_split(text, option) for text in texts or []]
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{option} {name}: found this view twice, expected it once.")
+    return pairs
 
 
 def _split(text: str, option: str) -> tuple[str, str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from charnerf.reconciling.agreement import disagreement, iou, share_apart
 from charnerf.reconciling.heights import row_offsets
-from charnerf.reconciling.registration import SIDE, filled, find_flow, resized, warped
+from charnerf.reconciling.registration import SIDE, filled, find_flow, premultiplied, resized, warped
 from charnerf.reconciling.tolerance import tolerances
 
 AGREES = (
@@ -166,13 +166,9 @@ def _partner(azimuths_deg: Sequence[float], index: int) -> int | None:
 
 def _copied(pictures: Sequence[np.ndarray], index: int) -> int | None:
     """An earlier picture that a picture is a copy of, mirrored or not."""
-    picture = _premultiplied(pictures[index])
-    for earlier, other in enumerate(map(_premultiplied, pictures[:index])):
+    picture = premultiplied(pictures[index])
+    for earlier, other in enumerate(map(premultiplied, pictures[:index])):
         least = min(np.abs(one - picture).mean() for one in (other, other[:, ::-1]))
         if least < COPY * (other[..., 3] > 0.5).mean():
             return earlier
     return None
-
-
-def _premultiplied(rgba: np.ndarray) -> np.ndarray:
-    return np.concatenate((rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]), axis=-1)

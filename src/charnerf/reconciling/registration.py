@@ -46,10 +46,10 @@ def warped(rgba: np.ndarray, flow: np.ndarray) -> np.ndarray:
         for one in flow
     )
     rows, columns = np.mgrid[:side, :side].astype(np.float32)
-    premultiplied = np.concatenate((rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]), axis=-1)
+    weighted = premultiplied(rgba)
     moved = np.stack(
         [
-            ndimage.map_coordinates(premultiplied[..., c], (rows + down, columns + right), order=1)
+            ndimage.map_coordinates(weighted[..., c], (rows + down, columns + right), order=1)
             for c in range(4)
         ],
         axis=-1,
@@ -71,15 +71,20 @@ def filled(rgba: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     return np.concatenate((colors, alpha[..., None]), axis=-1).astype(np.float32)
 
 
+def premultiplied(rgba: np.ndarray) -> np.ndarray:
+    """Straight-alpha pixels (..., 4) with their colours weighted by alpha."""
+    return np.concatenate((rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]), axis=-1)
+
+
 def resized(rgba: np.ndarray, side: int) -> np.ndarray:
     """A canvas (S, S, 4) at another size, antialiased on premultiplied colours."""
     if rgba.shape[0] == side:
         return rgba
-    premultiplied = np.concatenate((rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]), axis=-1).astype(np.float32)
+    weighted = premultiplied(rgba).astype(np.float32)
     small = np.stack(
         [
             np.asarray(
-                Image.fromarray(np.ascontiguousarray(premultiplied[..., c])).resize(
+                Image.fromarray(np.ascontiguousarray(weighted[..., c])).resize(
                     (side, side), Image.Resampling.BOX if side < rgba.shape[0] else Image.Resampling.BILINEAR
                 )
             )
