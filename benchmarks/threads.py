@@ -32,12 +32,12 @@ BUSY = "while True: pass"
 def thread_rows(say: Callable[[str], None]) -> list[dict[str, Any]]:
     """Medians over rounds in which every way takes its turn, idle and loaded; by the cores that this process may use."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    ways = {"chosen while training": None, f"{cores} always": cores, "1 always": 1}
+    choices = {"chosen while training": None, f"{cores} always": cores, "1 always": 1}
     steps: dict[tuple[str, bool], list[float]] = {
-        (way, loaded): [] for way in ways for loaded in (False, True)
+        (way, loaded): [] for way in choices for loaded in (False, True)
     }
     for turn in range(ROUNDS):
-        for way, threads in ways.items():
+        for way, threads in choices.items():
             for loaded in (False, True):
                 say(f"round {turn + 1} of {ROUNDS}: {way}, {'loaded' if loaded else 'idle'}")
                 with busy(cores if loaded else 0):
@@ -52,7 +52,7 @@ def thread_rows(say: Callable[[str], None]) -> list[dict[str, Any]]:
             "least loaded": min(steps[way, True]),
             "loaded over the old way's idle": median(steps[way, True]) / idle,
         }
-        for way in ways
+        for way in choices
     ]
 
 

@@ -122,9 +122,9 @@ def progress_of_run(
     *, step: int, seconds: float, budget_steps: int | None, budget_seconds: float | None
 ) -> float:
     """Share of the budget used up, in [0, 1]: of steps or of seconds, whichever is larger; 0 without one."""
-    shares = [0.0]
+    fractions = [0.0]
     if budget_steps is not None:
-        shares.append(step / budget_steps)
+        fractions.append(step / budget_steps)
     if budget_seconds is not None:
-        shares.append(seconds / budget_seconds)
-    return min(1.0, max(shares))
+        fractions.append(seconds / budget_seconds)
+    return min(1.0, max(fractions))

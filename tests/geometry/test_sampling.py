@@ -9,9 +9,9 @@ from charnerf.errors import ShapeError
 from charnerf.geometry.sampling import (
     draw_bins,
     edges_from_t_vals,
-    equal_shares,
     importance_t_vals,
     merge_t_vals,
+    stratified_numbers,
     stratified_t_vals,
     usable_weights,
 )
@@ -185,7 +185,9 @@ def test_draws_lie_in_bins_with_weight(*, shape, bins, num_samples, spread, spar
 
 
 def test_helpers():
-    torch.testing.assert_close(equal_shares(torch.zeros(1), (2, 2), None), torch.tensor([[0.25, 0.75]] * 2))
+    torch.testing.assert_close(
+        stratified_numbers(torch.zeros(1), (2, 2), None), torch.tensor([[0.25, 0.75]] * 2)
+    )
     torch.testing.assert_close(
         usable_weights(torch.tensor([1e38, 2e38]), torch.ones(2)), torch.tensor([0.5, 1.0])
     )

@@ -43,27 +43,27 @@ def run(
     """
     start = time.perf_counter()
 
-    def tell(text: str) -> None:
+    def announce(text: str) -> None:
         say(f"{time.perf_counter() - start:6.1f} s  {text}")
 
     bench = workbench(model)
-    tell("converged references of the characters")
+    announce("converged references of the characters")
     pictured = (
         embedded(NUM_CHARACTERS, bench.image_size)
         if data is None
         else of_dataset(data, split, NUM_CHARACTERS)
     )
     subjects = prepared(bench.network, pictured)
-    tell("rendering and training steps")
+    announce("rendering and training steps")
     result = headline(bench, subjects)
     if not quick:
-        tell("samples a ray and tolerances")
+        announce("samples a ray and tolerances")
         rows = sweep(sample_methods(bench), subjects, repeats=3)
         result["samples"] = [vars(row) for row in rows]
         if output is not None:
             title = f"{NUM_PIXELS} pixels of each of {len(subjects)} characters"
             plot_work_precision(rows, output / SAMPLES_PICTURE, title=title)
-    tell("done")
+    announce("done")
     return {
         **result,
         "environment": environment(model.device),

@@ -134,10 +134,10 @@ class ProceduralData(AbstractData):
 
     def check_image_size(self, size: int) -> None:
         """Check the size that characters are generated in."""
-        found = self._settings["size"]
-        if found != size:
+        generated = self._settings["size"]
+        if generated != size:
             raise ConfigError(
-                f"data.size: found {found}, expected scale.image_size = {size}; leave data.size out, or set both."
+                f"data.size: found {generated}, expected scale.image_size = {size}; leave data.size out, or set both."
             )
 
     def prepare(self, *, depth: bool = False) -> Path:

@@ -46,12 +46,12 @@ class Above:
     value: float
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """End of a sentence that names the nearest known name, or all of them."""
-    names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean '{close[0]}'?"
+def nearest(name: str, choices: Iterable[str]) -> str:
+    """End of a sentence that names the nearest choice, or all of them."""
+    names = sorted(choices)
+    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    if matches:
+        return f"did you mean '{matches[0]}'?"
     return f"expected one of: {', '.join(names)}." if names else "remove it."
 
 

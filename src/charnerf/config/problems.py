@@ -9,23 +9,23 @@ class Problems:
 
     trusted: tuple[str, ...] = ()
     copies: dict[str, str] = dataclasses.field(default_factory=dict)
-    found: list[tuple[str, str]] = dataclasses.field(default_factory=list)
+    entries: list[tuple[str, str]] = dataclasses.field(default_factory=list)
 
     def add(self, key: str, message: str) -> None:
         """Note a problem at a full key."""
-        if (key, message) not in self.found:
-            self.found.append((key, message))
+        if (key, message) not in self.entries:
+            self.entries.append((key, message))
 
     def touch(self, key: str) -> bool:
         """Whether a key, a part of it or a section around it has a problem."""
-        return any(_is_within(one, key) or _is_within(key, one) for one, _ in self.found)
+        return any(_is_within(one, key) or _is_within(key, one) for one, _ in self.entries)
 
     def lines(self) -> list[str]:
         """One line for each problem, by full key; a wrong value is named where it was written."""
-        wrong = {key for key, _ in self.found}
+        wrong = {key for key, _ in self.entries}
         return [
             f"{key}: {message}"
-            for key, message in self.found
+            for key, message in self.entries
             if not any(_is_within(self._origin(key), one) for one in wrong)
         ]
 

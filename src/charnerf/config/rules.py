@@ -91,19 +91,19 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
 
 def idle_settings(plain: Mapping[str, Any]) -> list[str]:
     """Settings of a valid config that have no effect in its combination, each with what to do."""
-    found = []
+    idle = []
     features = str(plain["features"]["_target_"])
     if get_object(features).reads_hull and not plain["model"]["hull"]:
         option = features.split(".")[-2]  # one option, one file
-        found.append(
+        idle.append(
             f"features={option} reads the hull, but model.hull=false: it reads zeros; use features=image."
         )
     for index, phase in enumerate(plain["schedule"]["phases"]):
         for unit, end in (phase.get("until") or {}).items():
             limit = plain["budget"].get(unit)
             if limit is not None and end >= limit:
-                found.append(
+                idle.append(
                     f"schedule.phases.{index}.until.{unit}={end}, but budget.{unit}={limit}: later phases"
                     " never begin."
                 )
-    return found
+    return idle

@@ -28,24 +28,24 @@ def resolve(name: Any, homes: Sequence[str], key: str, problems: Problems) -> Ca
         inside = name.startswith(ALLOWED_TARGETS)
         problems.add(key, f"found '{name}', {expected}{'.' if inside else advice}")
         return None
-    found = locate(name, key, problems)
-    if found is None:
+    target = locate(name, key, problems)
+    if target is None:
         return None
-    module = f"{getattr(found, '__module__', '')}."
-    if not callable(found) or not module.startswith(ALLOWED_TARGETS + trusted):
-        problems.add(key, f"found '{name}', which is {shown_object(found)}; {expected}.")
+    module = f"{getattr(target, '__module__', '')}."
+    if not callable(target) or not module.startswith(ALLOWED_TARGETS + trusted):
+        problems.add(key, f"found '{name}', which is {shown_object(target)}; {expected}.")
         return None
-    return found
+    return target
 
 
 def locate(name: str, key: str, problems: Problems) -> Any:
     """Import the longest module of a dotted name and follow its attributes; None where it leads nowhere."""
     pieces = name.split(".")
-    found: Any = None
+    target: Any = None
     for length in range(len(pieces) - 1, 0, -1):
         module = ".".join(pieces[:length])
         try:
-            found = importlib.import_module(module)
+            target = importlib.import_module(module)
         except ModuleNotFoundError as error:
             if error.name is not None and (module == error.name or module.startswith(f"{error.name}.")):
                 continue
@@ -54,15 +54,15 @@ def locate(name: str, key: str, problems: Problems) -> Any:
             )
             return None
         for position, attribute in enumerate(pieces[length:], start=length):
-            if not hasattr(found, attribute):
+            if not hasattr(target, attribute):
                 here = ".".join(pieces[:position])
                 problems.add(
                     key,
-                    f"'{name}' does not exist: {here} has no '{attribute}'; {suggestion(found, attribute)}",
+                    f"'{name}' does not exist: {here} has no '{attribute}'; {suggestion(target, attribute)}",
                 )
                 return None
-            found = getattr(found, attribute)
-        return found
+            target = getattr(target, attribute)
+        return target
     problems.add(
         key, f"'{name}' does not exist: there is no module '{pieces[0]}'; install it or correct the name."
     )
@@ -80,10 +80,8 @@ def suggestion(module: Any, attribute: str) -> str:
     return nearest(attribute, own) if own else "correct the name."
 
 
-def shown_object(found: Any) -> str:
+def shown_object(target: Any) -> str:
     """What a name led to."""
-    return (
-        f"{getattr(found, '__module__', '')}.{getattr(found, '__qualname__', type(found).__name__)}".lstrip(
-            "."
-        )
+    return f"{getattr(target, '__module__', '')}.{getattr(target, '__qualname__', type(target).__name__)}".lstrip(
+        "."
     )

@@ -104,7 +104,7 @@ def _validate_against(schema: type, cfg: DictConfig, trusted_targets: Sequence[s
         if not any(value is BROKEN or problems.touch(key) for key, value in zip(keys, values, strict=True)):
             for key, message in rule(*values):
                 problems.add(key, message)
-    if problems.found:
+    if problems.entries:
         raise ConfigError(as_message(problems.lines()))
 
 
@@ -127,8 +127,8 @@ def to_plain(node: Any, key: str, problems: Problems) -> Any:
     for name in names:
         if OmegaConf.is_interpolation(node, name):
             raw = str(OmegaConf.to_container(node, resolve=False)[name])  # type: ignore[index]
-            if found := INTERPOLATION.fullmatch(raw):
-                problems.copies[join(key, name)] = found[1]
+            if match := INTERPOLATION.fullmatch(raw):
+                problems.copies[join(key, name)] = match[1]
         try:
             missing = OmegaConf.is_missing(node, name)
             values[name] = MISSING if missing else to_plain(node[name], join(key, name), problems)

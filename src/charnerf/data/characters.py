@@ -209,8 +209,8 @@ def _read_depth(path: Path, size: tuple[int, int]) -> Tensor:
 def _read_image(path: Path, size: tuple[int, int], modes: Sequence[str], convert: str | None) -> np.ndarray:
     try:
         with Image.open(path) as image:
-            found, mode = image.size, image.mode
-            if found == size and (convert or mode in modes):
+            stored, mode = image.size, image.mode
+            if stored == size and (convert or mode in modes):
                 return np.array(image.convert(convert) if convert else image)
     except FileNotFoundError as err:
         raise DataError(f"{path}: no such file; restore it or capture the character again.") from err
@@ -218,9 +218,9 @@ def _read_image(path: Path, size: tuple[int, int], modes: Sequence[str], convert
         raise DataError(
             f"{path}: can not be read as a picture ({err}); restore it or capture it again."
         ) from err
-    if found != size:
+    if stored != size:
         raise DataError(
-            f"{path}: found {found[0]} x {found[1]} pixels, expected {size[0]} x {size[1]} as "
+            f"{path}: found {stored[0]} x {stored[1]} pixels, expected {size[0]} x {size[1]} as "
             f"{TRANSFORMS_FILE} says; "
             "resize the picture or correct w and h."
         )

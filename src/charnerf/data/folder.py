@@ -32,11 +32,11 @@ class FolderData(AbstractData):
         if not names:
             raise ConfigError(f"data.root: found no characters in '{self.root}', expected at least one.")
         cameras = read_transforms(self.root / names[0]).source_cameras
-        found = max(cameras.width, cameras.height)
-        if found != size:
+        needed = max(cameras.width, cameras.height)
+        if needed != size:
             raise ConfigError(
-                f"scale.image_size: found {size}, expected {found}, the size of the drawings of {self.root} ({names[0]}: "
-                f"{cameras.width} x {cameras.height} pixels). Set scale.image_size={found}, or capture a data set of this size by "
+                f"scale.image_size: found {size}, expected {needed}, the size of the drawings of {self.root} ({names[0]}: "
+                f"{cameras.width} x {cameras.height} pixels). Set scale.image_size={needed}, or capture a data set of this size by "
                 f"`charnerf capture MESHES -o DATASET --split train --size {size}`."
             )
 

@@ -123,8 +123,8 @@ def names_of(info: DatasetInfo, split: str) -> tuple[str, ...]:
     names = info.splits.get(split, ())
     if not names:
         filled = ", ".join(f"{name} ({len(members)})" for name, members in info.splits.items()) or "none"
-        found = "is empty" if split in info.splits else "does not exist"
-        raise DataError(f"{info.root / DATASET_FILE}: split {split!r} {found}; its splits are: {filled}.")
+        problem = "is empty" if split in info.splits else "does not exist"
+        raise DataError(f"{info.root / DATASET_FILE}: split {split!r} {problem}; its splits are: {filled}.")
     return names
 
 

@@ -56,9 +56,9 @@ class MixedDataset(Dataset[TrainBatch]):
         generator = torch.Generator().manual_seed(step_seed(self.seed, request.step))
         chosen = torch.randperm(len(self.store), generator=generator)[: self.characters]
         opened = [self.store.open(self.store.names[int(index)]) for index in chosen]
-        rays = _shares(request.rays, len(opened))
+        rays = _count_each(request.rays, len(opened))
         drawn = [self._rays(one, rays, generator) for one in opened]
-        points = _shares(request.surface_points, len(opened))
+        points = _count_each(request.surface_points, len(opened))
         surfaces = [one.surface for one in opened]
         surface = _sample_surfaces(surfaces, points, generator) if points else None
         space = self._space(opened, generator)
@@ -135,11 +135,11 @@ class MixedDataset(Dataset[TrainBatch]):
                 "model.hull: found false, but a term of the loss reads labelled points, expected a hull to draw them in; set its "
                 "weight to 0 or model.hull=true."
             )
-        parts = [
-            label_points(one, _shares(self.needs.space_points, len(opened)), generator) for one in opened
+        labelled = [
+            label_points(one, _count_each(self.needs.space_points, len(opened)), generator) for one in opened
         ]
         return SpacePoints(
-            points=torch.stack([p[0] for p in parts]), inside=torch.stack([p[1] for p in parts])
+            points=torch.stack([p[0] for p in labelled]), inside=torch.stack([p[1] for p in labelled])
         )
 
 
@@ -172,9 +172,9 @@ def stack_views(views: list[SourceViews]) -> SourceViews:
     )
 
 
-def _shares(total: int, parts: int) -> int:
-    """Equal shares of a total, rounded up."""
-    return -(-total // parts)
+def _count_each(total: int, number: int) -> int:
+    """How many each of a number of characters gives to a total, rounded up."""
+    return -(-total // number)
 
 
 def _sample_surfaces(

@@ -84,7 +84,7 @@ class CharacterStore:
         self._open: OrderedDict[str, OpenCharacter] = OrderedDict()
         self._used_bytes = 0
         self._seconds = 0.0
-        self._told = False
+        self._has_warned = False
 
     def __len__(self) -> int:
         """Number of characters."""
@@ -92,10 +92,10 @@ class CharacterStore:
 
     def open(self, name: str) -> OpenCharacter:
         """Return a character, from memory if it is there."""
-        found = self._open.get(name)
-        if found is not None:
+        held = self._open.get(name)
+        if held is not None:
             self._open.move_to_end(name)
-            return found
+            return held
         start = perf_counter()
         character = load_character(self.root, name)
         images = character.images(range(len(character.image_files)))
@@ -112,16 +112,16 @@ class CharacterStore:
         self._seconds += perf_counter() - start
         self._open[name] = opened
         self._used_bytes += opened.size_bytes
-        if self._used_bytes > self.memory_bytes and not self._told:
-            self._tell()
+        if self._used_bytes > self.memory_bytes and not self._has_warned:
+            self._warn_of_reopening()
         while self._used_bytes > self.memory_bytes and len(self._open) > 1:
             _, dropped = self._open.popitem(last=False)
             self._used_bytes -= dropped.size_bytes
         return opened
 
-    def _tell(self) -> None:
-        """Say once, when the first is about to be dropped, that characters are opened again and again, and what that costs."""
-        self._told = True
+    def _warn_of_reopening(self) -> None:
+        """Warn once, when the first is about to be dropped, that characters are opened again and again, and what that costs."""
+        self._has_warned = True
         opened, wanted = len(self._open), len(set(self.names))
         needed = self._used_bytes / opened * wanted / 2**20
         log.warning(

@@ -161,10 +161,10 @@ def _visible(
     """Points by area that cameras see, exactly num_points of them."""
     cameras = default_cameras(area.mesh) if cameras is None else cameras
     generator = torch.Generator().manual_seed(seed)
-    all_points, all_normals, draws, found = [], [], [], 0
+    all_points, all_normals, draws, num_visible = [], [], [], 0
     share = 0.6
     for _ in range(_MAX_ROUNDS):
-        count = min(int((num_points - found) / share * 1.05) + 64, 4 * num_points + 64)
+        count = min(int((num_points - num_visible) / share * 1.05) + 64, 4 * num_points + 64)
         draw = area.draw(count, generator)
         points = interpolate(area.mesh.triangles[draw.triangles], draw.u, draw.v).astype(np.float32)
         seen = see_points(area.mesh, points, draw.triangles, cameras)
@@ -172,9 +172,9 @@ def _visible(
         all_points.append(points[visible])
         all_normals.append(seen.normals[visible])
         draws.append(_Draw(draw.triangles[visible], draw.u[visible], draw.v[visible], draw.rgb[visible]))
-        found += int(visible.sum())
+        num_visible += int(visible.sum())
         share = max(float(visible.mean()), 0.02)
-        if found >= num_points:
+        if num_visible >= num_points:
             kept = slice(0, num_points)
             joined = _joined(draws)
             return (

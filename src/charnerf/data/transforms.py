@@ -212,10 +212,10 @@ def _is_orthographic(where: str, frame: Mapping[str, Any]) -> bool:
 
 
 def _refuse_distortion(where: str, frame: Mapping[str, Any]) -> None:
-    found = {key: frame[key] for key in _DISTORTION if frame.get(key)}
-    if found:
+    distortion = {key: frame[key] for key in _DISTORTION if frame.get(key)}
+    if distortion:
         raise DataError(
-            f"{where}: found lens distortion {found}, expected none; undistort the pictures first."
+            f"{where}: found lens distortion {distortion}, expected none; undistort the pictures first."
         )
 
 

@@ -193,8 +193,8 @@ def _without_specks(figure: np.ndarray, notes: list[str], *, margin: int) -> np.
     Returns:
         (H, W) bool.
     """
-    parts = label(figure, connectivity=2)
-    areas = np.bincount(parts.reshape(-1))
+    labels = label(figure, connectivity=2)
+    areas = np.bincount(labels.reshape(-1))
     areas[0] = 0
     if len(areas) < 2:
         return figure
@@ -202,7 +202,7 @@ def _without_specks(figure: np.ndarray, notes: list[str], *, margin: int) -> np.
     dropped = int((areas > 0).sum()) - len(kept)
     if dropped:
         notes.append(f"{dropped} specks dropped, each below {100 * SPECK_SHARE:.2f} % of the figure")
-    result = np.isin(parts, kept)
+    result = np.isin(labels, kept)
     return ndimage.binary_dilation(result, iterations=margin) if margin else result
 
 

@@ -67,11 +67,11 @@ def find_figures(drawing: Drawing) -> Sheet:
         DataError: If the background is not plain, nothing stands on it, or more than MOST_FIGURES figures do.
     """
     ink, lines = _ink(drawing)
-    parts = label(
+    labels = label(
         ndimage.binary_dilation(ink, iterations=max(1, round(JOINED * max(ink.shape)))), connectivity=2
     )
-    parts[~ink] = 0
-    regions = [one for one in regionprops(parts) if one.area >= 1e-5 * ink.size]
+    labels[~ink] = 0
+    regions = [one for one in regionprops(labels) if one.area >= 1e-5 * ink.size]
     if not regions:
         raise DataError(
             f"{drawing.name}: found nothing on its background, expected figures of a character. Check the file."
@@ -87,7 +87,7 @@ def find_figures(drawing: Drawing) -> Sheet:
     figures = []
     for place in order:
         index = chosen[place]
-        mine = np.isin(parts, [regions[i].label for i, owner in owners.items() if owner == index])
+        mine = np.isin(labels, [regions[i].label for i, owner in owners.items() if owner == index])
         figures.append(_crop(drawing, mine, ink | lines))
     aside = [LeftAside(_box(regions[i].bbox), why) for i, why in reasons.items() if i not in owners]
     aside += [LeftAside(_box(one.bbox), "a line") for one in regionprops(label(lines, connectivity=2))]
@@ -118,8 +118,8 @@ def _without_lines(ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         length = max(8, round(LINE_LENGTH * along.shape[1]))
         straight = _runs_at_least(along, length)
         thick = ndimage.binary_opening(along, structure=np.ones((thickest + 1, 1), dtype=bool))
-        found = straight & ~thick
-        lines |= found if axis else found.T
+        thin = straight & ~thick
+        lines |= thin if axis else thin.T
     return ink & ~lines, lines
 
 

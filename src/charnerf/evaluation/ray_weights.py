@@ -91,8 +91,8 @@ def normalised_entropy(weights: Tensor) -> Tensor:
     """
     total = weights.sum(-1, keepdim=True)
     even = torch.full_like(weights, 1.0 / weights.shape[-1])
-    shares = torch.where(total > 0, weights / total.clamp_min(torch.finfo(weights.dtype).tiny), even)
-    entropy = torch.special.entr(shares).sum(-1)
+    normalised = torch.where(total > 0, weights / total.clamp_min(torch.finfo(weights.dtype).tiny), even)
+    entropy = torch.special.entr(normalised).sum(-1)
     return (entropy / np.log(weights.shape[-1])).clamp(0.0, 1.0)
 
 
@@ -226,6 +226,6 @@ def _histogram(weights: Tensor, behind: Tensor) -> Tensor:
     edges = _edges().to(behind)
     place = torch.bucketize(behind, edges) - 1
     within = (place >= 0) & (place < len(edges) - 1)
-    shares = weights / weights.sum(-1, keepdim=True)
+    normalised = weights / weights.sum(-1, keepdim=True)
     empty = weights.new_zeros(len(weights), len(edges) - 1)
-    return empty.scatter_add(-1, place.clamp(0, len(edges) - 2), torch.where(within, shares, 0.0))
+    return empty.scatter_add(-1, place.clamp(0, len(edges) - 2), torch.where(within, normalised, 0.0))

@@ -51,9 +51,9 @@ def cross_sections(hull: Hull) -> CrossSections:
         after = torch.where(occupied, float(side), number).flip(axis).cummin(axis).values.flip(axis)
         middles.append(hull.box_min[axis] + 0.5 * (before + after + 1.0) * cell[axis])
         halves.append(0.5 * (after - before - 1.0) * cell[axis])
-    known = occupied.to(cell.dtype)
+    inside = occupied.to(cell.dtype)
     return CrossSections(
-        grid=torch.cat((torch.stack((*middles, *halves)) * known, known[None])),
+        grid=torch.cat((torch.stack((*middles, *halves)) * inside, inside[None])),
         box_min=hull.box_min,
         box_max=hull.box_max,
     )
@@ -75,7 +75,7 @@ def read_cross_sections(sections: CrossSections, points: Tensor) -> tuple[Tensor
         sections.grid[None], share.flip(-1)[None, None, None], align_corners=False, padding_mode="zeros"
     )[0, :, 0, 0].T
     amount = read[:, 6:]
-    known = amount > 1e-3
+    inside = amount > 1e-3
     middles, halves = (read[:, i : i + 3] / amount.clamp_min(1e-3) for i in (0, 3))
     places = (points - middles) / halves.clamp_min(1e-6)
-    return torch.where(known, places.clamp(-2.0, 2.0), 0.0), torch.where(known, halves, 0.0)
+    return torch.where(inside, places.clamp(-2.0, 2.0), 0.0), torch.where(inside, halves, 0.0)

@@ -19,7 +19,7 @@ def _check_num_samples(num_samples: int) -> None:
         raise ValueError(f"num_samples: found {num_samples}, expected at least 1.")
 
 
-def equal_shares(like: Tensor, shape: tuple[int, ...], generator: torch.Generator | None) -> Tensor:
+def stratified_numbers(like: Tensor, shape: tuple[int, ...], generator: torch.Generator | None) -> Tensor:
     """One number in each of shape[-1] equal shares of [0, 1], ascending, (*shape).
 
     Args:
@@ -57,7 +57,7 @@ def stratified_t_vals(
     """
     _check_num_samples(num_samples)
     near, far = torch.broadcast_tensors(full_precision(near)[..., None], full_precision(far)[..., None])
-    share = equal_shares(near, (*near.shape[:-1], num_samples), generator)
+    share = stratified_numbers(near, (*near.shape[:-1], num_samples), generator)
     return torch.minimum(near + (far - near) * share, far)  # this form stays ascending under rounding
 
 
@@ -116,7 +116,7 @@ def draw_bins(masses: Tensor, num_samples: int, generator: torch.Generator | Non
     # A parallel scan is not monotone to the last bit: bins without mass take exactly the value before them.
     cdf = torch.where(has_mass, masses.cumsum(dim=-1), 0.0).cummax(dim=-1).values
     total = cdf[..., -1:]
-    target = equal_shares(masses, (*masses.shape[:-1], num_samples), generator) * total
+    target = stratified_numbers(masses, (*masses.shape[:-1], num_samples), generator) * total
     bins = torch.searchsorted(cdf, target.contiguous(), right=True)
     last = torch.searchsorted(
         cdf, total.contiguous()

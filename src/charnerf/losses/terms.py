@@ -31,9 +31,9 @@ def absolute_depth_error(depth: Tensor, target_depth: Tensor, opacity: Tensor) -
     opacity with a weight, up to 1e7 m on a ray that sees nothing yet, and the product stays within the
     length of the ray.
     """
-    known = (target_depth > 0).to(depth.dtype)
+    meets = (target_depth > 0).to(depth.dtype)
     error = opacity.detach() * (depth - target_depth).abs()
-    return (error * known).sum() / known.sum().clamp_min(1.0)
+    return (error * meets).sum() / meets.sum().clamp_min(1.0)
 
 
 def balanced_occupancy_error(alphas: Tensor, inside: Tensor) -> Tensor:

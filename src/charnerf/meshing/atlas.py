@@ -91,10 +91,10 @@ def rasterise(atlas: Atlas, size: int) -> Texels:
     high = np.clip(np.floor(corners.max(1) - 0.5) + 1, 0, size).astype(np.int64)
     extent = np.maximum(high - low, 0)
     counts = extent.prod(1)
-    found = [
+    covered = [
         _inside(corners, low, extent, counts, chosen, size) for chosen in _batches(counts) if len(chosen)
     ]
-    index, face, weights = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    index, face, weights = (np.concatenate(parts) for parts in zip(*covered, strict=True))
     _, first = np.unique(index, return_index=True)  # a centre on an edge belongs to one triangle
     return Texels(index[first], face[first], weights[first])
 

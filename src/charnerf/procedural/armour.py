@@ -31,12 +31,12 @@ def _limb_shell(
     """A sleeve around the limb of a name such as "left_boot": over a span of it, radius times flare."""
     left, leg = name.startswith("left"), name.endswith("boot")
     points = figure.build.leg_points(left) if leg else figure.build.arm_points(left)
-    known, radii = (
-        (body.LEG_SHARES, body.leg_radii(figure)) if leg else (body.ARM_SHARES, body.arm_radii(figure))
+    knots, radii = (
+        (body.LEG_KNOTS, body.leg_radii(figure)) if leg else (body.ARM_KNOTS, body.arm_radii(figure))
     )
-    shares = np.linspace(span[0], span[1], 4)
-    sizes = np.interp(shares, known, radii) * np.linspace(flare[0], flare[1], 4) + 0.006
-    return flat(name, body.limb(points, shares, sizes, figure), color)
+    along = np.linspace(span[0], span[1], 4)
+    sizes = np.interp(along, knots, radii) * np.linspace(flare[0], flare[1], 4) + 0.006
+    return flat(name, body.limb(points, along, sizes, figure), color)
 
 
 def make_boots(figure: Figure) -> list[Part]:

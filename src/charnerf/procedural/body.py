@@ -7,21 +7,21 @@ from charnerf.procedural.parts import Part, flat
 from charnerf.procedural.shapes import FRONT, UP, Array, Shape, ball, box, loft, tube, unit
 from charnerf.procedural.textures import Canvas, Color, darker
 
-TRUNK_SHARES = (0.0, 0.06, 0.14, 0.28, 0.42, 0.56, 0.68, 0.79, 0.88, 0.95, 1.0)
+TRUNK_KNOTS = (0.0, 0.06, 0.14, 0.28, 0.42, 0.56, 0.68, 0.79, 0.88, 0.95, 1.0)
 
 
 def trunk_shape(figure: Figure, *, margin: float = 1.0, low: float = 0.0, high: float = 1.0) -> Shape:
     """The trunk, or a shell of it between two shares of its height."""
-    inner = [share for share in TRUNK_SHARES if low < share < high]
-    shares = (low, *inner, high)
-    rings = [figure.trunk(share, margin) for share in shares]
+    inner = [share for share in TRUNK_KNOTS if low < share < high]
+    along = (low, *inner, high)
+    rings = [figure.trunk(share, margin) for share in along]
     return loft(
         [centre for centre, _ in rings],
         [half for _, half in rings],
         axis=UP,
         sides=figure.build.sides,
         power=figure.build.power,
-        along=(np.array(shares) - low) / (high - low),
+        along=(np.array(along) - low) / (high - low),
     )
 
 
@@ -32,26 +32,26 @@ def trunk_canvas(figure: Figure, color: Color, *, low: float = 0.0, high: float 
     return Canvas(around, (high - low) * (build.shoulder_height - figure.trunk_bottom), color)
 
 
-def limb(points: Array, shares: Array, radii: Array, figure: Figure, *, front: Array = FRONT) -> Shape:
-    """A tube along a bent limb (3 joints): rings at shares of its length, half sizes (k,) or (k, 2)."""
+def limb(points: Array, along: Array, radii: Array, figure: Figure, *, front: Array = FRONT) -> Shape:
+    """A tube along a bent limb (3 joints): rings at places along it (shares of its length), half sizes (k,) or (k, 2)."""
     first, second = np.linalg.norm(points[1] - points[0]), np.linalg.norm(points[2] - points[1])
     knots = np.array((0.0, first, first + second)) / (first + second)
-    path = np.stack([np.interp(shares, knots, points[:, axis]) for axis in range(3)], axis=-1)
+    path = np.stack([np.interp(along, knots, points[:, axis]) for axis in range(3)], axis=-1)
     ends = (
         (0.0, 0.0)
         if figure.build.sides == 4
         else (0.3 * float(np.mean(radii[0])), 0.2 * float(np.mean(radii[-1])))
     )
     power = figure.build.power
-    return loft(path, radii, front=front, sides=figure.build.sides, power=power, bulge=ends, along=shares)
+    return loft(path, radii, front=front, sides=figure.build.sides, power=power, bulge=ends, along=along)
 
 
-ARM_SHARES = np.array((0.0, 0.06, 0.25, 0.45, 0.52, 0.7, 0.9, 1.0))
-LEG_SHARES = np.array((0.0, 0.08, 0.25, 0.45, 0.52, 0.72, 0.92, 1.0))
+ARM_KNOTS = np.array((0.0, 0.06, 0.25, 0.45, 0.52, 0.7, 0.9, 1.0))
+LEG_KNOTS = np.array((0.0, 0.08, 0.25, 0.45, 0.52, 0.72, 0.92, 1.0))
 
 
 def arm_radii(figure: Figure, margin: float = 1.0) -> Array:
-    """Radii at ARM_SHARES, m."""
+    """Radii at ARM_KNOTS, m."""
     shape = np.array((1.0, 1.12, 1.0, 0.88, 0.86, 0.92, 0.7, 0.66))
     if figure.build.name == "blob":
         shape = np.array((1.0, 1.0, 0.9, 0.9, 1.0, 1.1, 1.2, 1.15))
@@ -61,7 +61,7 @@ def arm_radii(figure: Figure, margin: float = 1.0) -> Array:
 
 
 def leg_radii(figure: Figure, margin: float = 1.0) -> Array:
-    """Radii at LEG_SHARES, m."""
+    """Radii at LEG_KNOTS, m."""
     shape = np.array((1.0, 1.1, 1.0, 0.84, 0.82, 0.84, 0.6, 0.58))
     if figure.build.sides == 4:
         shape = np.ones(8)
@@ -75,7 +75,7 @@ def make_arms(figure: Figure, canvases: tuple[Canvas, Canvas]) -> list[Part]:
     parts = []
     for left, canvas in zip((True, False), canvases, strict=True):
         name = "left_arm" if left else "right_arm"
-        shape = limb(figure.build.arm_points(left), ARM_SHARES, arm_radii(figure), figure)
+        shape = limb(figure.build.arm_points(left), ARM_KNOTS, arm_radii(figure), figure)
         texels = canvas.image()
         root = figure.build.arm_points(left)[0]
         inside = root * np.array((0.3, 1.0, 1.0)) + np.array((0.0, 0.0, 0.1 * figure.build.arm_radius))
@@ -92,10 +92,10 @@ def make_arms(figure: Figure, canvases: tuple[Canvas, Canvas]) -> list[Part]:
 def make_legs(figure: Figure, canvases: tuple[Canvas, Canvas], loose: float) -> list[Part]:
     """Left and right leg, painted from hip (v = 0) to ankle; loose trousers are wider below the knee."""
     parts = []
-    radii = leg_radii(figure) * (1.0 + loose * np.clip(LEG_SHARES - 0.3, 0.0, None))
+    radii = leg_radii(figure) * (1.0 + loose * np.clip(LEG_KNOTS - 0.3, 0.0, None))
     for left, canvas in zip((True, False), canvases, strict=True):
         name = "left_leg" if left else "right_leg"
-        shape = limb(figure.build.leg_points(left), LEG_SHARES, radii, figure)
+        shape = limb(figure.build.leg_points(left), LEG_KNOTS, radii, figure)
         parts.append(Part(name, shape, canvas.image()))
     return parts
 

@@ -72,14 +72,14 @@ def _long_ear(figure: Figure, on_top: Array, side: float, long: float | None) ->
     path = np.stack(
         (on_top - 0.1 * tall * UP, on_top + 0.55 * tall * UP + lean, on_top + tall * UP + 1.6 * lean)
     )
-    shares = np.array(
+    half_sizes = np.array(
         ((1.0, 0.5), (0.6, 0.3), (0.06, 0.04)) if long is None else ((1.0, 0.4), (1.0, 0.4), (0.3, 0.1))
     )
     inner = path - np.array((0.0, 0.32 * wide, 0.0))
     pink = mix(skin, (0.95, 0.6, 0.65), 0.6)
     return [
-        flat("ears", loft(path, wide * shares, sides=6), darker(skin, 0.92)),
-        flat("ears", loft(inner, 0.6 * wide * shares + 0.002, sides=6), pink),
+        flat("ears", loft(path, wide * half_sizes, sides=6), darker(skin, 0.92)),
+        flat("ears", loft(inner, 0.6 * wide * half_sizes + 0.002, sides=6), pink),
     ]
 
 

@@ -52,7 +52,7 @@ class Figure:
         top = max(build.shoulder - 1.0 * build.arm_radius, 0.6 * build.waist)
         neck = min(0.42 * build.head_width, 0.5 * top) if build.name != "blocky" else top
         hips = max(build.hip, 0.7 * build.waist) if build.name != "blocky" else build.waist
-        shares = (0.0, 0.14, 0.42, 0.68, 0.88, 1.0)
+        knots = (0.0, 0.14, 0.42, 0.68, 0.88, 1.0)
         if build.name == "blocky":
             widths, depths = (
                 (build.waist, build.waist, build.waist, build.waist, build.waist, build.waist),
@@ -62,7 +62,7 @@ class Figure:
             widths = (0.72 * hips, hips, build.waist, chest, top, neck)
             bust = 1.1 if build.feminine else 1.0
             depths = (0.72, 0.98, 0.86 if build.name != "giant" else 1.05, bust, 0.78, 0.5)
-        half = (np.interp(share, shares, widths), build.depth * np.interp(share, shares, depths))
+        half = (np.interp(share, knots, widths), build.depth * np.interp(share, knots, depths))
         height = self.trunk_bottom + share * (build.shoulder_height - self.trunk_bottom)
         belly = (
             -0.25 * build.depth * np.exp(-(((share - 0.35) / 0.2) ** 2)) * (build.name in ("giant", "blob"))

@@ -71,7 +71,7 @@ class Voxels:
 def _boxes(block: Block) -> list[tuple[NDArray[np.int64], NDArray[np.int64], int]]:
     """Cover the cubes of a block by boxes of one colour each: low and high corners, colour number."""
     left = block.copy()
-    found = []
+    boxes = []
     for x, y, z in np.argwhere(block > 0):
         number = left[x, y, z]
         if number == 0:
@@ -86,8 +86,8 @@ def _boxes(block: Block) -> list[tuple[NDArray[np.int64], NDArray[np.int64], int
         while end_y < left.shape[1] and (left[x:end_x, end_y, z:end_z] == number).all():
             end_y += 1
         left[x:end_x, y:end_y, z:end_z] = 0
-        found.append((np.array((x, y, z)), np.array((end_x, end_y, end_z)), int(number)))
-    return found
+        boxes.append((np.array((x, y, z)), np.array((end_x, end_y, end_z)), int(number)))
+    return boxes
 
 
 def _paint_torso(voxels: Voxels, torso: Block, cloth: int) -> None:

@@ -72,18 +72,18 @@ def find_drawings(folder: Path) -> tuple[Path, Path, Path]:
 
 
 def _find(folder: Path, *stems: str) -> Path:
-    found = [
+    matches = [
         path
         for path in (sorted(folder.iterdir()) if folder.is_dir() else [])
         if path.stem.lower() in stems and path.suffix.lower() in SUFFIXES
     ]
-    if len(found) != 1:
-        names = ", ".join(path.name for path in found) or "none"
+    if len(matches) != 1:
+        names = ", ".join(path.name for path in matches) or "none"
         raise DataError(
             f"{folder}: found {names} as the {stems[0]} view, expected one picture named {' or '.join(stems)} "
             f"({', '.join(SUFFIXES)}); rename or add it."
         )
-    return found[0]
+    return matches[0]
 
 
 def _left(column: int, size: int) -> int:

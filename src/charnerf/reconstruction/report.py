@@ -90,10 +90,10 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
         f"{built.num_extracted} faces before decimation.",
     ]
     if built.textured is not None:
-        asked = built.textured.num_from_field / max(built.textured.num_texels, 1)
+        by_field = built.textured.num_from_field / max(built.textured.num_texels, 1)
         lines.append(
-            f"Texture: {100 - 100 * asked:.1f} % of {built.textured.num_texels} texels from the drawings alone, the field"
-            f" was asked for {100 * asked:.1f} %."
+            f"Texture: {100 - 100 * by_field:.1f} % of {built.textured.num_texels} texels from the drawings alone, the field"
+            f" was asked for {100 * by_field:.1f} %."
         )
     return lines
 

@@ -34,16 +34,16 @@ def run_check(
     start = time.perf_counter()
     if devices is None:
         devices = [torch.device("cpu")] + ([torch.device("cuda")] if torch.cuda.is_available() else [])
-    found: list[CheckRow | CheckCurve] = []
+    measured: list[CheckRow | CheckCurve] = []
     for device in devices:
         for dtype in dtypes:
             for case in CASES:
-                found.extend(case(Target(device, dtype)))
+                measured.extend(case(Target(device, dtype)))
     if trained is not None:
-        found.extend(check_trained(trained))
+        measured.extend(check_trained(trained))
     return CheckReport(
-        rows=tuple(item for item in found if isinstance(item, CheckRow)),
-        curves=tuple(item for item in found if isinstance(item, CheckCurve)),
+        rows=tuple(item for item in measured if isinstance(item, CheckRow)),
+        curves=tuple(item for item in measured if isinstance(item, CheckCurve)),
         seconds=time.perf_counter() - start,
         environment={
             "torch": torch.__version__,

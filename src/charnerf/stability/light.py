@@ -50,12 +50,12 @@ def alpha_cases(target: Target) -> Iterator[CheckRow | CheckCurve]:
     slopes = exactly(lambda tau: mpmath.exp(-tau), densities)
     for formula, function in (("ours", alphas_from_densities), ("naive", naive.alphas)):
         sigma = densities.clone().requires_grad_()
-        found = function(sigma, deltas)
-        (gradient,) = torch.autograd.grad(found.float().sum() if target.is_half else found.sum(), sigma)
-        errors = (doubled(found) - exact).abs() / exact
+        computed = function(sigma, deltas)
+        (gradient,) = torch.autograd.grad(computed.float().sum() if target.is_half else computed.sum(), sigma)
+        errors = (doubled(computed) - exact).abs() / exact
         steepness = (doubled(gradient) - slopes).abs() / slopes.clamp_min(1e-30)
         slope = None if target.is_half else largest(steepness)  # a half's gradient is rounded to that half
-        measured = Errors(largest(errors), slope, count_non_finite(found, gradient))
+        measured = Errors(largest(errors), slope, count_non_finite(computed, gradient))
         yield target.row("alphas", "every tau, relative", measured, ALPHA, formula=formula)
         yield _curve("alpha", target, formula, products, errors)
 
@@ -143,10 +143,10 @@ def depth_cases(target: Target) -> Iterator[CheckRow]:
         ("depth_over_background", depth_over_background, over),
     ):
         leaf = weights.clone().requires_grad_()
-        found = function(leaf, t_vals, far)
-        (gradient,) = torch.autograd.grad(found.sum(), leaf)
-        bad = count_non_finite(found) if target.is_half else count_non_finite(found, gradient)
-        errors = Errors(largest(doubled(found) - expected), None, bad)
+        computed = function(leaf, t_vals, far)
+        (gradient,) = torch.autograd.grad(computed.sum(), leaf)
+        bad = count_non_finite(computed) if target.is_half else count_non_finite(computed, gradient)
+        errors = Errors(largest(doubled(computed) - expected), None, bad)
         yield target.row(kernel, "opacity 0..1, m", errors, Bounds(5e-6, 1e-13))
     steepest = largest(gradient) / 4.0
     yield target.row(
@@ -157,9 +157,9 @@ def depth_cases(target: Target) -> Iterator[CheckRow]:
     )
     if not target.is_half:
         leaf = weights.clone().requires_grad_()
-        found = naive.depth(leaf, t_vals)
-        (gradient,) = torch.autograd.grad(found.sum(), leaf)
-        errors = Errors(largest(doubled(found) - exact), None, count_non_finite(found, gradient))
+        computed = naive.depth(leaf, t_vals)
+        (gradient,) = torch.autograd.grad(computed.sum(), leaf)
+        errors = Errors(largest(doubled(computed) - exact), None, count_non_finite(computed, gradient))
         yield target.row("expected_depth", "opacity 0..1, m", errors, Bounds(5e-6, 1e-13), formula="naive")
 
 
@@ -202,17 +202,17 @@ def sampling_cases(target: Target) -> Iterator[CheckRow]:
         usable = bool(weights.isfinite().all()) and float(weights.sum()) > 0
         reference = doubled(weights) if usable else torch.ones(64, dtype=torch.float64)
         cdf = torch.cat((torch.zeros(1, dtype=torch.float64), (reference / reference.sum()).cumsum(0)))
-        shares = (torch.arange(128, dtype=torch.float64) + 0.5) / 128
+        quantiles = (torch.arange(128, dtype=torch.float64) + 0.5) / 128
         for formula in ("ours", "naive"):
             if formula == "ours":
                 drawn = importance_t_vals(edges, weights, 128)
             else:
-                drawn = naive.draw(edges, weights, target.tensor(shares))
-            found = doubled(drawn)
-            position = ((found - 2.0) * 32.0).nan_to_num(nan=0.0).clamp(0, 64)
+                drawn = naive.draw(edges, weights, target.tensor(quantiles))
+            computed = doubled(drawn)
+            position = ((computed - 2.0) * 32.0).nan_to_num(nan=0.0).clamp(0, 64)
             index = position.floor().long().clamp_max(63)
             mass = cdf[index] + (position - index) * (cdf[index + 1] - cdf[index])
-            errors = Errors(largest(mass - shares), None, count_non_finite(drawn))
+            errors = Errors(largest(mass - quantiles), None, count_non_finite(drawn))
             if formula == "ours" or not usable:
                 yield target.row("importance sampling", name, errors, Bounds(2e-5, 1e-12), formula=formula)
 
@@ -226,10 +226,10 @@ def linear_draw_cases(target: Target) -> Iterator[CheckRow]:
     ends = torch.zeros_like(t_vals[:, 0]), torch.ones_like(t_vals[:, 0])
     densities = target.tensor(scales)[:, None] * t_vals
     drawn = PiecewiseLinear().importance_t_vals(densities, t_vals, edges_from_t_vals(t_vals, *ends), 64)
-    shares = (torch.arange(64, dtype=torch.float64) + 0.5) / 64
+    quantiles = (torch.arange(64, dtype=torch.float64) + 0.5) / 64
     half = 0.5 * doubled(target.tensor(scales))[:, None]
     mass = torch.expm1(-half * doubled(drawn).square()) / torch.expm1(-half)
-    errors = Errors(largest(mass - shares), None, count_non_finite(drawn))
+    errors = Errors(largest(mass - quantiles), None, count_non_finite(drawn))
     yield target.row("importance sampling, linear", "density t, tau 1e-12..1e30", errors, Bounds(2e-5, 1e-10))
 
 

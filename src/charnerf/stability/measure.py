@@ -95,9 +95,10 @@ def largest(errors: Tensor) -> float:
     )
 
 
-def relative_to_ray(found: Tensor, exact: Tensor, floor: float = 1e-30) -> Tensor:
+def relative_to_ray(computed: Tensor, exact: Tensor, floor: float = 1e-30) -> Tensor:
     """Largest error along the last axis over the largest exact number there, or the floor, (...)."""
     scale = exact.abs().amax(dim=-1).clamp_min(floor)
     return (
-        torch.nan_to_num(doubled(found) - exact, nan=torch.inf, posinf=torch.inf).abs().amax(dim=-1) / scale
+        torch.nan_to_num(doubled(computed) - exact, nan=torch.inf, posinf=torch.inf).abs().amax(dim=-1)
+        / scale
     )

@@ -37,14 +37,14 @@ def encoding(x: Tensor, num_frequencies: int) -> Tensor:
     return torch.cat((torch.sin(phases), torch.cos(phases)), dim=-1).flatten(-2)
 
 
-def draw(t_edges: Tensor, masses: Tensor, shares: Tensor) -> Tensor:
+def draw(t_edges: Tensor, masses: Tensor, quantiles: Tensor) -> Tensor:
     """Inverse CDF without guards."""
     cdf = torch.cumsum(masses / masses.sum(-1, keepdim=True), dim=-1)
     cdf = torch.cat((torch.zeros_like(cdf[..., :1]), cdf), dim=-1)
-    upper = torch.searchsorted(cdf, shares.contiguous(), right=True).clamp(1, masses.shape[-1])
+    upper = torch.searchsorted(cdf, quantiles.contiguous(), right=True).clamp(1, masses.shape[-1])
     low, high = cdf.gather(-1, upper - 1), cdf.gather(-1, upper)
     start, end = t_edges.gather(-1, upper - 1), t_edges.gather(-1, upper)
-    return start + (shares - low) / (high - low) * (end - start)
+    return start + (quantiles - low) / (high - low) * (end - start)
 
 
 def box_interval(

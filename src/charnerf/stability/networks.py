@@ -187,8 +187,8 @@ def loss_cases(target: Target) -> Iterator[CheckRow]:
         "occupancy, all inside": (balanced_occupancy_error, one, one, 0.0),
         "occupancy, all outside, all wrong": (balanced_occupancy_error, one, zero, 0.5),
     }
-    for name, (term, found, wanted, exact) in cases.items():
-        leaf = found.clone().requires_grad_()
+    for name, (term, computed, wanted, exact) in cases.items():
+        leaf = computed.clone().requires_grad_()
         value = term(leaf, wanted)
         (gradient,) = torch.autograd.grad(value, leaf)
         errors = Errors(largest(doubled(value) - exact), None, count_non_finite(value, gradient))

@@ -77,8 +77,8 @@ def encoding_cases(target: Target) -> Iterator[CheckRow]:
             rows.append([[float(mpmath.sinpi(p)), float(mpmath.cospi(p))] for p in phases])
     exact = torch.tensor(rows, dtype=torch.float64)  # (N, K, 2)
     for formula, function in (("ours", positional_encoding), ("naive", naive.encoding)):
-        found = function(x[:, None], octaves).unflatten(-1, (octaves, 2))
-        errors = Errors(largest(doubled(found) - exact), None, count_non_finite(found))
+        computed = function(x[:, None], octaves).unflatten(-1, (octaves, 2))
+        errors = Errors(largest(doubled(computed) - exact), None, count_non_finite(computed))
         yield target.row("positional encoding", "12 octaves, |x| to 12346", errors, PHASE, formula=formula)
 
 
@@ -118,12 +118,12 @@ def box_cases(target: Target) -> Iterator[CheckRow]:
         else:
             near, far = naive.box_interval(start, along, box_min, box_max)
             near = near.clamp_min(0.0)
-        found = torch.stack((doubled(near), doubled(far)), dim=-1)
-        length = found[:, 1] - found[:, 0]
-        errors = torch.where(hits[:, None], (found - expected) / scale, length.clamp_min(0.0)[:, None])
+        computed = torch.stack((doubled(near), doubled(far)), dim=-1)
+        length = computed[:, 1] - computed[:, 0]
+        errors = torch.where(hits[:, None], (computed - expected) / scale, length.clamp_min(0.0)[:, None])
         yield target.row(
             "ray and box", "axes, faces, corners, slopes to 1e-42",
-            Errors(largest(errors), None, count_non_finite(found[hits])), INTERVAL, formula=formula,
+            Errors(largest(errors), None, count_non_finite(computed[hits])), INTERVAL, formula=formula,
         )  # fmt: skip
 
 
@@ -207,15 +207,15 @@ def projection_cases(target: Target) -> Iterator[CheckRow]:
         right, forward = cameras.world_from_camera[..., :3, 0], -cameras.world_from_camera[..., :3, 2]
         odd = torch.stack((centre, centre + right, centre - forward, centre - 1e-3 * forward + 1e-4 * right))
         leaf = odd.clone().requires_grad_()
-        found, depth, in_front = project(cameras, leaf)
-        (gradient,) = torch.autograd.grad(found.sum() + depth.sum(), leaf)
+        computed, depth, in_front = project(cameras, leaf)
+        (gradient,) = torch.autograd.grad(computed.sum() + depth.sum(), leaf)
         accepted = 0 if orthographic else int(in_front.sum())
-        errors = Errors(float(accepted), None, count_non_finite(found, depth, gradient))
+        errors = Errors(float(accepted), None, count_non_finite(computed, depth, gradient))
         yield target.row("projection", f"{kind}: centre, plane, behind accepted", errors, Bounds(0.0, 0.0))
     local = target.tensor([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1e-4, 0.0, 1e-3]])
-    found = naive.project(local, 150.0)
-    accepted = int((found.abs() < 64).all(-1).sum())
-    errors = Errors(float(accepted), None, count_non_finite(found))
+    computed = naive.project(local, 150.0)
+    accepted = int((computed.abs() < 64).all(-1).sum())
+    errors = Errors(float(accepted), None, count_non_finite(computed))
     yield target.row(
         "projection", "pinhole: centre, plane, behind accepted", errors, Bounds(0.0, 0.0), formula="naive"
     )

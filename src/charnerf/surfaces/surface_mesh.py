@@ -180,11 +180,11 @@ def shade(
 
 def _read_texture(texture: Texture, uv: np.ndarray, level_of: np.ndarray) -> np.ndarray:
     level_of = np.minimum(level_of, len(texture.levels) - 1)
-    found = np.unique(level_of)
-    if len(found) == 1:
-        return _bilinear(texture.levels[found[0]], uv)
+    used = np.unique(level_of)
+    if len(used) == 1:
+        return _bilinear(texture.levels[used[0]], uv)
     rgba = np.zeros((len(uv), 4), np.float32)
-    for level in found:
+    for level in used:
         chosen = np.flatnonzero(level_of == level)
         rgba[chosen] = _bilinear(texture.levels[level], uv[chosen])
     return rgba

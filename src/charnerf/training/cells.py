@@ -23,7 +23,7 @@ from charnerf.training.run import run_training
 
 log = logging.getLogger(__name__)
 CELL_FILE, ERROR_FILE, LOCK_FILE, LOG_FILE = "cell.json", "error.txt", ".cell.lock", "train.log"
-ASKED_FILE = ".asked"  # its time tells when a sweep last asked for the cell
+REQUEST_FILE = ".requested"  # its time is when a sweep last asked for the cell
 DONE, RUNNING, FAILED, INTERRUPTED = "done", "running", "failed", "interrupted"
 MAX_NAME = 120  # characters of a folder's name
 
@@ -69,15 +69,15 @@ def run_cell(
     """
     folder = cell_folder(grid, cfg, name)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / ASKED_FILE).touch()
+    (folder / REQUEST_FILE).touch()
     with _alone(folder) as is_alone:
-        found = read_cell(folder)
-        if found is not None and found.state == DONE:
+        cell = read_cell(folder)
+        if cell is not None and cell.state == DONE:
             log.info("Finished before, skipped: %s", folder)
-            return found
+            return cell
         if not is_alone:
             log.warning("Worked on by another process, left to it: %s", folder)
-            return found or Cell(folder.name, RUNNING, None, time.time(), None)
+            return cell or Cell(folder.name, RUNNING, None, time.time(), None)
         if (job_folder / ".hydra").is_dir():
             shutil.copytree(job_folder / ".hydra", folder / ".hydra", dirs_exist_ok=True)
         return _train(cfg, folder, train)
@@ -117,8 +117,8 @@ def cells_of(grid: Path, *, since: float = 0.0) -> list[Cell]:
     cells = []
     for file in sorted(grid.glob(f"*/{CELL_FILE}")):
         cell = read_cell(file.parent)
-        asked = file.with_name(ASKED_FILE)
-        if cell is None or (asked.is_file() and asked.stat().st_mtime < since):
+        request = file.with_name(REQUEST_FILE)
+        if cell is None or (request.is_file() and request.stat().st_mtime < since):
             continue
         if cell.state == RUNNING:
             with _alone(file.parent) as is_alone:

@@ -73,13 +73,13 @@ def build_data(
 def _surface_of(cfg: DictConfig) -> SurfaceOf:
     """Opens a character's surface; None without a mesh, which is logged once."""
     make_surface: Callable[..., AbstractSurface] = build_part(cfg.surface)
-    told: set[str] = set()
+    warned_of: set[str] = set()
 
     def surface_of(character: Character) -> AbstractSurface | None:
         if character.mesh_file is None:
-            if not told:
+            if not warned_of:
                 log.warning("Character %s has no mesh: it is trained by rays alone.", character.name)
-                told.add(character.name)
+                warned_of.add(character.name)
             return None
         return make_surface(load_surface_mesh(character.mesh_file))
 

@@ -77,7 +77,7 @@ def finish_run(
     beside = metrics["baselines"]["visual_hull"]
     log.info(
         "Test: %.2f dB, %.2f dB on the foreground, SSIM %.3f (visual hull: %.2f, %.2f, %.3f). Report: %s",
-        *(found[key] for found in (metrics, beside) for key in ("psnr", "psnr_foreground", "ssim")),
+        *(scores[key] for scores in (metrics, beside) for key in ("psnr", "psnr_foreground", "ssim")),
         report,
     )
 

@@ -42,12 +42,12 @@ def begin(model: CharNeRF, cfg: DictConfig) -> str | None:
 
 def settings_of(model: DictConfig, *, unlike: DictConfig) -> list[str]:
     """Overrides that give a run the networks of another model's config: an option is named as its file is."""
-    found = []
+    overrides = []
     for section in NETWORK_SECTIONS:
         for key, value in model[section].items():
             if OmegaConf.select(unlike, f"{section}.{key}") == value:
                 continue
-            found.append(
+            overrides.append(
                 f"{section}={value.split('.')[-2]}" if key == "_target_" else f"{section}.{key}={value}"
             )
-    return found
+    return overrides

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from charnerf.errors import ConfigError
-from charnerf.geometry.sampling import equal_shares, merge_t_vals, usable_weights
+from charnerf.geometry.sampling import merge_t_vals, stratified_numbers, usable_weights
 from charnerf.volume.quadrature.base import AbstractQuadrature
 from charnerf.volume.quadrature.constant import PiecewiseConstant
 
@@ -68,6 +68,8 @@ class DepthGuided(AbstractQuadrature):
         t_vals, t_edges = t_vals.detach(), t_edges.detach()
         weights = usable_weights(self.weights(densities.detach(), t_vals, t_edges)[0], t_edges.diff(dim=-1))
         depth = (weights * t_vals).sum(-1, keepdim=True) / weights.sum(-1, keepdim=True)
-        shares = equal_shares(depth, (*depth.shape[:-1], num_samples), generator).clamp(1e-6, 1.0 - 1e-6)
-        drawn = depth + self.deviation * torch.special.ndtri(shares)
+        numbers = stratified_numbers(depth, (*depth.shape[:-1], num_samples), generator).clamp(
+            1e-6, 1.0 - 1e-6
+        )
+        drawn = depth + self.deviation * torch.special.ndtri(numbers)
         return torch.minimum(torch.maximum(drawn, t_edges[..., :1]), t_edges[..., -1:])

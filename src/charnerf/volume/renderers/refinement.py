@@ -123,10 +123,10 @@ def split_bins(s_edges: Tensor, begins: Tensor, errors: Tensor, num_split: int, 
     parent = parent.clamp_max(num_bins - 1)
     piece = number - (ends - pieces).gather(1, parent)
     low, high = s_edges.gather(1, parent), s_edges.gather(1, parent + 1)
-    parts = pieces.gather(1, parent)
-    start = torch.where(beyond, high, low + (high - low) * (piece / parts))
+    num_pieces = pieces.gather(1, parent)
+    start = torch.where(beyond, high, low + (high - low) * (piece / num_pieces))
     edges = torch.cat((start, s_edges[:, -1:]), dim=-1)
-    middle = ~beyond & ((parts == 1) | (piece == 1))
+    middle = ~beyond & ((num_pieces == 1) | (piece == 1))
     return Split(
         s_edges=edges,
         begins=begins.gather(1, parent) & (piece == 0) & ~beyond,
