@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from charnerf.cli.messages import say
 from charnerf.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -64,6 +65,18 @@ class GivenDrawings:
 
     drawings: Mapping["Viewpoint", "Path | np.ndarray"]
     sheet: "np.ndarray | None" = None
+
+
+def drawings_options(
+    drawings: Files = None,
+    *,
+    side_shows: SideShows = "left",
+    view: Seen = None,
+    order: Order = None,
+    figure: FigureOf = None,
+) -> GivenDrawings:
+    """The drawings of a command line, as `given_drawings` finds them."""
+    return given_drawings(drawings, view, side_shows=side_shows, order=order, figures=figure, say=say)
 
 
 def given_drawings(

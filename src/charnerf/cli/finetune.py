@@ -4,20 +4,17 @@ from typing import Annotated
 
 import typer
 
-from charnerf.cli.drawings import FigureOf, Files, Order, Seen, SideShows, given_drawings
+from charnerf.cli.drawings import GivenDrawings, drawings_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Device, Folder, Trusted, WeightsOption
+from charnerf.cli.options import Device, Folder, Trusted, WeightsOption, gathered
 
 
+@gathered(given=drawings_options)
 def command(
-    drawings: Files = None,
+    given: GivenDrawings,
     *,
     output: Folder,
-    side_shows: SideShows = "left",
-    view: Seen = None,
-    order: Order = None,
-    figure: FigureOf = None,
     weights: WeightsOption = None,
     seconds: Annotated[
         float, typer.Option(min=1.0, help="Time for it; it ends earlier where nothing improves.")
@@ -31,7 +28,6 @@ def command(
     that nothing was learnt from come out better and novel views stay near the start; else DIR gets the starting
     weights, and it is said. They are for this character alone: use them by `--weights DIR`.
     """
-    given = given_drawings(drawings, view, side_shows=side_shows, order=order, figures=figure, say=say)
     from charnerf.finetuning.command import finetune_drawings
 
     model = load_model(weights, device=device, trust=trust)

@@ -10,20 +10,7 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import (
-    Cameras,
-    Colors,
-    Dataset,
-    Device,
-    Folder,
-    Height,
-    Resolution,
-    Smooth,
-    Symmetric,
-    TextureSize,
-    Trusted,
-    Weights,
-)
+from charnerf.cli.options import Dataset, Device, Folder, Symmetric, Trusted, Weights, gathered, mesh_options
 from charnerf.meshing.options import MeshOptions
 
 if TYPE_CHECKING:
@@ -68,6 +55,7 @@ Format = Annotated[
 ]
 
 
+@gathered(mesh=mesh_options(MeshOptions()))
 def command(
     *,
     data: Dataset,
@@ -75,16 +63,11 @@ def command(
     character: Name = None,
     split: Split = None,
     weights: Weights = None,
-    resolution: Resolution = MeshOptions.resolution,
+    mesh: MeshOptions,
     lod: Grids = None,
     faces: Faces = None,
-    cameras: Cameras = MeshOptions.num_cameras,
     convergence: Convergence = False,
-    smooth: Smooth = MeshOptions.smooth,
     symmetric: Symmetric = False,
-    height: Height = MeshOptions.height,
-    texture: Colors = MeshOptions.texture,
-    texture_size: TextureSize = MeshOptions.texture_size,
     suffix: Format = "glb",
     device: Device = "auto",
     trust: Trusted = None,
@@ -100,14 +83,8 @@ def command(
     from charnerf.reconstruction.meshes import write_convergence, write_lods, write_mesh
 
     grids, counts = _numbers(lod, "--lod", least=16), _numbers(faces, "--faces", least=4)
-    options = MeshOptions(
-        resolution=grids[0] if grids else resolution,
-        num_cameras=cameras,
-        faces=counts[0] if counts else None,
-        smooth=smooth,
-        height=height,
-        texture=texture,
-        texture_size=texture_size,
+    options = replace(
+        mesh, resolution=grids[0] if grids else mesh.resolution, faces=counts[0] if counts else None
     )
     heroes = _heroes(data, character, split, symmetric, weights, device=device, trust=trust)
     if split is not None:
@@ -117,7 +94,7 @@ def command(
         if lod is None and len(counts) <= 1:
             files = write_mesh(hero, one.name, folder, options, suffix=suffix)
         else:
-            grids = grids or (resolution,)
+            grids = grids or (mesh.resolution,)
             files = write_lods(
                 hero, one.name, folder, options, resolutions=grids, faces=counts, suffix=suffix
             )

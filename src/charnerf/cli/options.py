@@ -1,11 +1,15 @@
 """Options that several commands share: one name, one meaning, one help text."""
 
+import inspect
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from charnerf.meshing.options import Texture
+from charnerf.meshing.options import MeshOptions, Texture
 
 Weights = Annotated[
     Path | None,
@@ -86,3 +90,56 @@ Colors = Annotated[
     ),
 ]
 TextureSize = Annotated[int, typer.Option(help="Texels a side of the texture.")]
+
+
+def gathered(**makers: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Let a command take, in place of a parameter, the options of the function that makes its value.
+
+    Args:
+        makers: By the command's parameter.
+    """
+    options = {name: inspect.signature(maker).parameters for name, maker in makers.items()}
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command).parameters
+        parameters = [one for name, each in own.items() for one in options.get(name, {name: each}).values()]
+
+        @wraps(command)
+        def gathering(**values: Any) -> None:
+            made = {
+                name: maker(**{option: values.pop(option) for option in options[name]})
+                for name, maker in makers.items()
+            }
+            command(**made, **values)
+
+        shown = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
+        gathering.__signature__ = inspect.Signature(shown)  # type: ignore[attr-defined]
+        gathering.__annotations__ = {one.name: one.annotation for one in shown}
+        return gathering
+
+    return decorate
+
+
+def mesh_options(default: MeshOptions) -> Callable[..., MeshOptions]:
+    """What makes a mesh's options of those on a command line, with defaults of the command's own."""
+
+    def make(
+        *,
+        resolution: Resolution = default.resolution,
+        cameras: Cameras = default.num_cameras,
+        smooth: Smooth = default.smooth,
+        height: Height = default.height,
+        texture: Colors = default.texture,
+        texture_size: TextureSize = default.texture_size,
+    ) -> MeshOptions:
+        return replace(
+            default,
+            resolution=resolution,
+            num_cameras=cameras,
+            smooth=smooth,
+            height=height,
+            texture=texture,
+            texture_size=texture_size,
+        )
+
+    return make

@@ -1,49 +1,41 @@
 """`charnerf reconstruct`: drawings or a sheet to a mesh, a turntable, views and a report."""
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
 
-from charnerf.cli.drawings import AsDrawn, FigureOf, Files, Order, Seen, SideShows, given_drawings
+from charnerf.cli.drawings import AsDrawn, GivenDrawings, drawings_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import (
-    Cameras,
-    Colors,
     Device,
     Folder,
-    Height,
-    Resolution,
     Size,
-    Smooth,
     Symmetric,
-    TextureSize,
     Trusted,
     WeightsOption,
+    gathered,
+    mesh_options,
 )
 from charnerf.meshing.options import MeshOptions
 from charnerf.reconstruction.options import LIGHT, ReconstructionOptions
 
 
+@gathered(given=drawings_options, mesh=mesh_options(LIGHT))
 def command(
-    drawings: Files = None,
+    given: GivenDrawings,
     *,
     output: Folder,
-    side_shows: SideShows = "left",
-    view: Seen = None,
-    order: Order = None,
-    figure: FigureOf = None,
     as_drawn: AsDrawn = False,
     weights: WeightsOption = None,
-    resolution: Resolution = LIGHT.resolution,
+    mesh: MeshOptions,
     faces: Annotated[int | None, typer.Option(help="Faces of the mesh after decimation.")] = LIGHT.faces,
+    symmetric: Symmetric = ReconstructionOptions.symmetric,
     frames: Annotated[
         int, typer.Option(min=1, help="Frames of the turntable.")
     ] = ReconstructionOptions.frames,
     size: Size = ReconstructionOptions.size,
-    cameras: Cameras = LIGHT.num_cameras,
-    smooth: Smooth = LIGHT.smooth,
-    symmetric: Symmetric = ReconstructionOptions.symmetric,
     refine: Annotated[
         float | None,
         typer.Option(
@@ -52,9 +44,6 @@ def command(
             help="Adapt the multi-view blocks to the drawings first, for so long at most; kept only if better.",
         ),
     ] = ReconstructionOptions.refine_seconds,
-    height: Height = LIGHT.height,
-    texture: Colors = LIGHT.texture,
-    texture_size: TextureSize = LIGHT.texture_size,
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -64,17 +53,7 @@ def command(
     height and floor line, and where views disagree the later ones are moved to the earlier ones. What was assumed
     is printed, and drawn in the report.
     """
-    given = given_drawings(drawings, view, side_shows=side_shows, order=order, figures=figure, say=say)
-    mesh = MeshOptions(
-        resolution=resolution,
-        num_cameras=cameras,
-        faces=faces,
-        smooth=smooth,
-        height=height,
-        texture=texture,
-        texture_size=texture_size,
-    )
-    options = ReconstructionOptions(mesh, frames, size, symmetric, refine)
+    options = ReconstructionOptions(replace(mesh, faces=faces), frames, size, symmetric, refine)
     from charnerf.reconstruction.folder import reconstruct
 
     model = load_model(weights, device=device, trust=trust)
