@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from charnerf.errors import DataError
+
 
 @contextmanager
 def write_aside(path: Path) -> Iterator[Path]:
@@ -56,6 +58,16 @@ def write_bytes(path: Path, content: bytes) -> None:
     """Write a file, whole or not at all."""
     with write_aside(path) as aside:
         aside.write_bytes(content)
+
+
+def check_folder(path: Path) -> None:
+    """Check that a folder can be written to where a command is told to.
+
+    Raises:
+        DataError: If there is a file.
+    """
+    if path.exists() and not path.is_dir():
+        raise DataError(f"{path}: found a file, expected a folder to write to. Choose another.")
 
 
 @contextmanager

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from charnerf.bench.headline import headline
 from charnerf.bench.plots import plot_work_precision
-from charnerf.bench.subjects import NUM_CHARACTERS, NUM_PIXELS, embedded, of_dataset, prepared
+from charnerf.bench.subjects import NUM_CHARACTERS, NUM_PIXELS, Subject, embedded, of_dataset, prepared
 from charnerf.bench.sweep import sample_methods, sweep
 from charnerf.bench.tables import comparison_table, headline_table, rows_table
-from charnerf.bench.workbench import workbench
+from charnerf.bench.workbench import Workbench, workbench
 from charnerf.evaluation.environment import environment
 from charnerf.inference.model import Model
 
@@ -58,11 +58,7 @@ def run(
     result = headline(bench, subjects)
     if not quick:
         announce("samples a ray and tolerances")
-        rows = sweep(sample_methods(bench), subjects, repeats=3)
-        result["samples"] = [vars(row) for row in rows]
-        if output is not None:
-            title = f"{NUM_PIXELS} pixels of each of {len(subjects)} characters"
-            plot_work_precision(rows, output / SAMPLES_PICTURE, title=title)
+        result["samples"] = _sweep_samples(bench, subjects, output)
     announce("done")
     return {
         **result,
@@ -71,6 +67,17 @@ def run(
         "data": "embedded" if data is None else f"{data.name}, split {split}",
         "seconds": time.perf_counter() - start,
     }
+
+
+def _sweep_samples(
+    bench: Workbench, subjects: Sequence[Subject], output: Path | None
+) -> list[dict[str, Any]]:
+    """Rows of the sweep of samples and tolerances, and its diagram in a folder."""
+    rows = sweep(sample_methods(bench), subjects, repeats=3)
+    if output is not None:
+        title = f"{NUM_PIXELS} pixels of each of {len(subjects)} characters"
+        plot_work_precision(rows, output / SAMPLES_PICTURE, title=title)
+    return [vars(row) for row in rows]
 
 
 def summary(result: dict[str, Any]) -> str:

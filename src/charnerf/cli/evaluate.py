@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -90,16 +90,13 @@ def command(
 
     Prints metrics.json.
     """
-    if views not in (None, "all") and not (views.isdigit() and int(views) >= 1):
-        raise ConfigError(f"--views: found '{views}', expected a number from 1 on, or all.")
+    num_views = _number_of_views(views)
     if resolution is not None:
         MeshOptions(resolution=resolution)
-    from charnerf.evaluation.evaluate import evaluate
-    from charnerf.evaluation.metrics_file import write_metrics
+    from charnerf.evaluation.evaluate import as_captured, evaluate
     from charnerf.evaluation.nearest import TrainingCharacters
     from charnerf.inference.weights import run_folder
     from charnerf.meshing.build import build_mesh
-    from charnerf.reporting.run_report import write_run_report
 
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
@@ -110,20 +107,37 @@ def command(
         model.renderer,
         data,
         split,
-        views=run_views if views is None else "all" if views == "all" else int(views),
+        views=num_views or run_views,
         output=output,
         mesh=partial(build_mesh, options=options) if mesh else None,
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=_train_seconds(run),
-        redrawn=None if drawn is None else _redrawn(drawn, model.image_size, reconciled=not as_drawn),
+        redrawn=as_captured if drawn is None else _redrawn(drawn, model.image_size, reconciled=not as_drawn),
     )
+    _write(metrics, output, json_file)
+    typer.echo(json.dumps(metrics, indent=2))
+
+
+def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None) -> None:
+    """Write metrics.json and the report into the folder of predictions, and the metrics to a file."""
+    from charnerf.evaluation.metrics_file import write_metrics
+    from charnerf.reporting.run_report import write_run_report
+
     if output is not None:
         write_metrics(output / "metrics.json", metrics)
         say(f"report: {write_run_report(output)}")
     if json_file is not None:
         write_metrics(json_file, metrics)
-    typer.echo(json.dumps(metrics, indent=2))
+
+
+def _number_of_views(text: str | None) -> int | Literal["all"] | None:
+    """Fixed views a character of a number or `all`; None where nothing is said."""
+    if text is None or text == "all":
+        return text
+    if not (text.isdigit() and int(text) >= 1):
+        raise ConfigError(f"--views: found '{text}', expected a number from 1 on, or all.")
+    return int(text)
 
 
 def _redrawn(text: str, size: int, *, reconciled: bool) -> "Callable[[Character], Character]":

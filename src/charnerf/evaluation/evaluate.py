@@ -20,6 +20,11 @@ from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.base import AbstractRenderer
 
 
+def as_captured(character: Character) -> Character:
+    """The character with the source views that it has."""
+    return character
+
+
 def evaluate(
     network: CharNeRF,
     renderer: AbstractRenderer,
@@ -32,7 +37,7 @@ def evaluate(
     baselines: bool = True,
     training: TrainingCharacters | None = None,
     train_seconds: float | None = None,
-    redrawn: Callable[[Character], Character] | None = None,
+    redrawn: Callable[[Character], Character] = as_captured,
 ) -> dict[str, Any]:
     """Measure a model on a split; draws a bar with the time left, returns the content of metrics.json.
 
@@ -48,25 +53,22 @@ def evaluate(
         baselines: As `measure_character` takes it.
         training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
-        redrawn: Gives a character other source views, such as `drawings.redrawn` does; None keeps those captured.
+        redrawn: Gives a character other source views, such as `drawings.redrawn` does.
 
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
         NumericalError: If a prediction is not finite; the message names the picture.
     """
-    measure = partial(
-        measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training, lpips=Lpips()
-    )
+    lpips = Lpips()
+    measure = partial(measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training)
     names = names_of(read_dataset(root), split)
     results = []
     with tqdm(total=0, desc=f"evaluate {split}", unit="view") as bar:
         for place, name in enumerate(names):
-            character = load_character(root, name)
-            if redrawn is not None:
-                character = redrawn(character)
+            character = redrawn(load_character(root, name))
             frames = fixed_views(character, views)
             bar.total = bar.n + len(frames) * (len(names) - place)  # the others are taken to have as many
-            result = measure(character, frames, on_picture=bar.update)
+            result = measure(character, frames, lpips=lpips, on_picture=bar.update)
             if output is not None:
                 save_pictures(output / "images" / name, character, frames, result.pictures)
             results.append(replace(result, pictures={}))  # of one character at a time: they take memory

@@ -8,7 +8,7 @@ from tqdm import tqdm
 
 from charnerf.drawings.turnaround import Picture
 from charnerf.drawings.viewpoints import Viewpoint
-from charnerf.errors import DataError
+from charnerf.files import check_folder
 from charnerf.finetuning.finetune import CurvePoint, Finetuned, finetune
 from charnerf.finetuning.recipe import Recipe
 from charnerf.finetuning.report import summary_lines, write_finetuned
@@ -52,8 +52,7 @@ def finetune_drawings(
     Raises:
         DataError: If a drawing can not be used, or the folder can not be written.
     """
-    if output.exists() and not output.is_dir():
-        raise DataError(f"{output}: found a file, expected a folder to write to. Choose another.")
+    check_folder(output)
     hero = model.encode_drawings(given)
     drawings = hero.turnaround
     assert drawings is not None  # encode made it

@@ -27,6 +27,7 @@ from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
 from charnerf.models.character import CharacterField
 from charnerf.models.charnerf import CharNeRF
+from charnerf.scene import Scene
 from charnerf.types import LeftOut
 
 if TYPE_CHECKING:
@@ -114,14 +115,7 @@ def finetune(
     with torch.no_grad():
         hull = hero.scene.bounds.hull
         encoded = network.encode(hero.views, None if hull is None else hull[None], detailed=hero.detailed)
-        scene = network.scene(encoded, 0)
-        assert isinstance(scene.field, CharacterField)  # a network makes no other
-        sets = prepare_rays(scene.field, model.renderer, scene, hero.views, hero.radius(), recipe)
-    if not len(sets.learnt) or not len(sets.held_out):
-        raise DataError(
-            f"drawings: found {len(sets.learnt)} rays to learn from and {len(sets.held_out)} held "
-            "out, expected some of each. Check the drawings' masks."
-        )
+        sets = _prepare(network.scene(encoded, 0), hero, model.renderer, recipe)
     prepared = time.perf_counter()
     run = _Run(network, model.renderer, sets, recipe, start)
     best = run.learn(on_progress)
@@ -142,6 +136,18 @@ def finetune(
         num_answers=run.num_answers,
         seconds={"prepare": prepared - start, "learn": time.perf_counter() - prepared},
     )
+
+
+def _prepare(scene: Scene, hero: Hero, renderer: AbstractRenderer, recipe: Recipe) -> RaySets:
+    """Rays of the drawings, to learn from and held out."""
+    assert isinstance(scene.field, CharacterField)  # a network makes no other
+    sets = prepare_rays(scene.field, renderer, scene, hero.views, hero.radius(), recipe)
+    if not len(sets.learnt) or not len(sets.held_out):
+        raise DataError(
+            f"drawings: found {len(sets.learnt)} rays to learn from and {len(sets.held_out)} held "
+            "out, expected some of each. Check the drawings' masks."
+        )
+    return sets
 
 
 def learning_parts(network: CharNeRF) -> nn.ModuleList:

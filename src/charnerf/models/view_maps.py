@@ -79,20 +79,14 @@ class ViewMaps:
             sections: Whether to measure the hull's cross-sections.
             coverage: Whether to read the drawings' coverage, for `kept_share`.
         """
-        pictures, rows, size = images_on_white(views.images), None, (0, 0)
+        pictures = images_on_white(views.images)
         carving, shown = (~views.mirrored).nonzero()[:, 0], None
         if coverage:
             dilations = None if hull is None else hull.dilations[present]
             alphas = widened_coverage(views.images[:, 3:], dilations)
             pictures = torch.cat((pictures, alphas), dim=1)
             shown = F.max_pool2d(alphas[carving, 0], 2, stride=1) > 0.0
-        if hull is not None:
-            maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
-            size = (maps.shape[-1], maps.shape[-2])
-            if maps.shape[-2:] == pictures.shape[-2:]:
-                pictures = torch.cat((pictures, maps.to(pictures.dtype)), dim=1)
-            else:
-                rows = maps_to_rows(maps)
+        pictures, rows, size = _with_hull_maps(pictures, hull, present)
         return cls(
             cameras=views.cameras,
             parallel=bool(views.cameras.orthographic.all()),
@@ -208,6 +202,19 @@ class Pictures:
         width, height = self.size
         own = bilinear_rows(uv * uv.new_tensor(self.size), width=width, height=height)
         return read_rows(self.rows, *own).unflatten(0, uv.shape[:2])
+
+
+def _with_hull_maps(
+    pictures: Tensor, hull: Hull | None, present: Tensor
+) -> tuple[Tensor, Tensor | None, tuple[int, int]]:
+    """Pictures with the hull's maps as further channels, or those maps as rows where their size is another; and their size."""
+    if hull is None:
+        return pictures, None, (0, 0)
+    maps = torch.stack((hull.front_depths[present], hull.edge_distances[present]), dim=1)
+    size = (maps.shape[-1], maps.shape[-2])
+    if maps.shape[-2:] == pictures.shape[-2:]:
+        return torch.cat((pictures, maps.to(pictures.dtype)), dim=1), None, size
+    return pictures, maps_to_rows(maps), size
 
 
 def kept_share(coverage: Tensor) -> Tensor:

@@ -12,8 +12,7 @@ from tqdm import tqdm
 
 from charnerf.drawings.turnaround import Picture, Turnaround
 from charnerf.drawings.viewpoints import Viewpoint
-from charnerf.errors import DataError
-from charnerf.files import write_folder_aside
+from charnerf.files import check_folder, write_folder_aside
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import plot_curve, summary_lines
@@ -84,29 +83,16 @@ def reconstruct(
         DataError: If a drawing can not be used, or the folder can not be written.
         NumericalError: If the field is empty or not finite.
     """
-    if output.exists() and not output.is_dir():
-        raise DataError(f"{output}: found a file, expected a folder to write to. Choose another.")
+    check_folder(output)
     seconds: dict[str, float] = {}
     with _timed(seconds, "encode"):
-        hero = model.encode_drawings(given, reconciled=reconciled)
-    drawings = hero.turnaround
-    assert drawings is not None  # encode made it
-    for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
-        say(line)
-    refined = None
-    if options.refine_seconds is not None:
-        with _timed(seconds, "refine"):
-            refined = refine(model, hero, options.refine_seconds)
-        hero = refined.hero
-        for line in summary_lines(refined):
-            say(line)
+        hero, drawings = _encoded(model, given, reconciled, say)
+    hero, refined = _refined(model, hero, options.refine_seconds, seconds, say)
     pictures, built = _pictures_and_mesh(hero.symmetric() if options.symmetric else hero, options, seconds)
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
         say(line)
     with write_folder_aside(output) as folder:
-        if sheet is not None:
-            Image.fromarray(sheet).save(folder / "sheet_as_read.png")
-        film, views = _write_pieces(folder, pictures, built, drawings, refined, seconds, model.source.name)
+        film, views = _write(folder, pictures, built, drawings, sheet, refined, seconds, model.source.name)
     for other in {"turntable.mp4", "turntable.gif"} - {film}:  # of a reconstruction before
         (output / other).unlink(missing_ok=True)
     return Reconstruction(
@@ -128,6 +114,35 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     seconds[stage] = time.perf_counter() - start
 
 
+def _encoded(
+    model: Model, given: Mapping[Viewpoint, Picture], reconciled: bool, say: Callable[[str], object]
+) -> tuple[Hero, Turnaround]:
+    """The character, and its drawings as they were read."""
+    hero = model.encode_drawings(given, reconciled=reconciled)
+    drawings = hero.turnaround
+    assert drawings is not None  # encode made it
+    for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
+        say(line)
+    return hero, drawings
+
+
+def _refined(
+    model: Model,
+    hero: Hero,
+    time_limit: float | None,
+    seconds: dict[str, float],
+    say: Callable[[str], object],
+) -> tuple[Hero, Finetuned | None]:
+    """The character by weights adapted to its drawings, where there is time for that, and how they were adapted."""
+    if time_limit is None:
+        return hero, None
+    with _timed(seconds, "refine"):
+        refined = refine(model, hero, time_limit)
+    for line in summary_lines(refined):
+        say(line)
+    return refined.hero, refined
+
+
 def _pictures_and_mesh(
     hero: Hero, options: ReconstructionOptions, seconds: dict[str, float]
 ) -> tuple[list[np.ndarray], BuiltMesh]:
@@ -142,11 +157,12 @@ def _pictures_and_mesh(
     return pictures, built
 
 
-def _write_pieces(
+def _write(
     folder: Path,
     pictures: list[np.ndarray],
     built: BuiltMesh,
     drawings: Turnaround,
+    sheet: np.ndarray | None,
     refined: Finetuned | None,
     seconds: dict[str, float],
     weights: str,
@@ -159,6 +175,8 @@ def _write_pieces(
     views = _write_views(pictures, folder / "views")
     Image.fromarray(drawings.picture).save(folder / "drawings.png")
     model_sheet(drawings, pictures).save(folder / "sheet.png")
+    if sheet is not None:
+        Image.fromarray(sheet).save(folder / "sheet_as_read.png")
     if refined is not None:
         plot_curve(refined, folder / "refinement.png")
     text = report_text(
@@ -170,7 +188,7 @@ def _write_pieces(
         seconds=seconds,
         weights=weights,
         refined=refined,
-        from_sheet=(folder / "sheet_as_read.png").exists(),
+        from_sheet=sheet is not None,
     )
     (folder / "report.md").write_text(text, encoding="utf-8")
     return film.name, [view.name for view in views]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,21 +45,7 @@ def build_trainer(
         WhiteAlarm(),
         CurveWriter(path=folder / "curve.csv", clock=clock, values=values),
         PictureLogger(),
-        ModelCheckpoint(
-            dirpath=folder / "checkpoints",
-            filename="best",
-            monitor="val/psnr_foreground",
-            mode="max",
-            enable_version_counter=False,
-        ),
-        # of its own: Lightning's `save_last` writes only where the best improved
-        ModelCheckpoint(dirpath=folder / "checkpoints", filename="last", enable_version_counter=False),
-        ModelCheckpoint(  # the same file between two validations that are far apart
-            dirpath=folder / "checkpoints",
-            filename="last",
-            train_time_interval=CHECKPOINT_EVERY,
-            enable_version_counter=False,
-        ),
+        *_checkpoints(folder / "checkpoints"),
     ]
     return build_part(
         cfg.trainer,
@@ -74,6 +61,16 @@ def build_trainer(
             "log_every_n_steps": 20,
         },
     )
+
+
+def _checkpoints(folder: Path) -> list[ModelCheckpoint]:
+    """The best by validation, and the last, written at validations and between two that are far apart."""
+    write = partial(ModelCheckpoint, dirpath=folder, enable_version_counter=False)
+    return [
+        write(filename="best", monitor="val/psnr_foreground", mode="max"),
+        write(filename="last"),  # of its own: Lightning's `save_last` writes only where the best improved
+        write(filename="last", train_time_interval=CHECKPOINT_EVERY),
+    ]
 
 
 def log_hyperparameters(trainer: L.Trainer, cfg: DictConfig, model: CharNeRF) -> None:
