@@ -110,12 +110,20 @@ class SourceViews(TensorRecord):
         cameras: Cameras of shape (B, V).
         present: (B, V), bool; False pads characters that have fewer views than their batch.
         mirrored: (B, V), bool; True marks a view made by mirroring another one.
+        widened_alphas: (B, V, H, W), in [0, 1], or None: where the figure may be although a view does not show it there, as
+            drawings that disagree need it; all 1 for a view that only colours.
     """
 
     images: Tensor
     cameras: Cameras
     present: Tensor
     mirrored: Tensor
+    widened_alphas: Tensor | None = None
+
+    @property
+    def carving_alphas(self) -> Tensor:
+        """What hulls are carved from, (B, V, H, W): the pictures' alphas, widened where they were."""
+        return self.images[..., 3, :, :] if self.widened_alphas is None else self.widened_alphas
 
 
 @dataclass(frozen=True)

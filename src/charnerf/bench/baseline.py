@@ -55,7 +55,7 @@ class PixelAligned:
         sections = None if hull is None else cross_sections(hull)
         carving, coverage = (views.present & ~views.mirrored).nonzero()[:, 0], None
         if hull is not None:
-            coverage = widened_coverage(views.images[carving, 3:], hull.dilations[carving])
+            coverage = widened_coverage(views.carving_alphas[carving, None], hull.dilations[carving])
         pictures = images_on_white(views.images)
         return cls(views, encoded.feature_maps[index], pictures, hull, maps, sections, carving, coverage)
 

@@ -157,6 +157,7 @@ def stack_views(views: list[SourceViews]) -> SourceViews:
     cameras = [view.cameras for view in views]
     present = padded([view.present for view in views])
     counts = torch.tensor([view.present.shape[1] for view in views])
+    any_widened = any(view.widened_alphas is not None for view in views)
     return SourceViews(
         images=padded([view.images for view in views]),
         cameras=Cameras(
@@ -169,6 +170,7 @@ def stack_views(views: list[SourceViews]) -> SourceViews:
         ),
         present=present & (torch.arange(most) < counts[:, None]),
         mirrored=padded([view.mirrored for view in views]),
+        widened_alphas=padded([view.carving_alphas for view in views]) if any_widened else None,
     )
 
 

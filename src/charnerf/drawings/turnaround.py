@@ -78,15 +78,20 @@ def read_views(drawings: Mapping[Viewpoint, Picture], *, size: int, reconciled: 
     figures = [_prepare(viewpoint, source) for viewpoint, source in drawings.items()]
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
     given = _canvases(figures, extent, size)
-    agreement = reconcile(given, [figure.viewpoint.azimuth_deg for figure in figures])
+    agreement = reconcile(
+        given,
+        [figure.viewpoint.azimuth_deg for figure in figures],
+        [figure.viewpoint.elevation_deg for figure in figures],
+    )
     finest = max(round(2.0 * extent * figure.box.height / HEIGHT) for figure in figures)
     detail = min(max(finest, DETAIL[0], size), max(DETAIL[1], size))
-    canvases, detailed = given, _canvases(figures, extent, detail)
+    canvases, detailed, widened = given, _canvases(figures, extent, detail), None
     if reconciled:
         canvases, detailed = agreement.apply(canvases), agreement.apply(detailed)
+        widened = agreement.widened_alphas(canvases)
     names = tuple(figure.viewpoint.name for figure in figures)
     return Turnaround(
-        views=_source_views(canvases, figures, extent),
+        views=_source_views(canvases, figures, extent, widened),
         detailed=_source_views(detailed, figures, extent),
         names=names,
         half_extent=extent,
@@ -123,8 +128,13 @@ def _canvases(figures: Sequence[_Figure], extent: float, size: int) -> list[np.n
     return [place(figure.cutout.rgba, figure.box, extent=extent, size=size) for figure in figures]
 
 
-def _source_views(canvases: Sequence[np.ndarray], figures: Sequence[_Figure], extent: float) -> SourceViews:
-    """Canvases with their cameras, B = 1."""
+def _source_views(
+    canvases: Sequence[np.ndarray],
+    figures: Sequence[_Figure],
+    extent: float,
+    widened: np.ndarray | None = None,
+) -> SourceViews:
+    """Canvases with their cameras, and what their hull is carved from, B = 1."""
     flags = torch.zeros(1, len(canvases), dtype=torch.bool)
     images = torch.from_numpy(np.stack(canvases)).permute(0, 3, 1, 2)[None].contiguous()
     angles = torch.tensor(
@@ -133,7 +143,11 @@ def _source_views(canvases: Sequence[np.ndarray], figures: Sequence[_Figure], ex
     directions = direction_from_angles(angles[:, 0], angles[:, 1])
     cameras = framing_cameras(directions, radius=extent, size=images.shape[-1], orthographic=True)
     return SourceViews(
-        images=images, cameras=cameras.to(torch.float32)[None], present=~flags, mirrored=flags.clone()
+        images=images,
+        cameras=cameras.to(torch.float32)[None],
+        present=~flags,
+        mirrored=flags.clone(),
+        widened_alphas=None if widened is None else torch.from_numpy(widened)[None],
     )
 
 

@@ -140,7 +140,13 @@ def mirror_cameras(cameras: Cameras) -> Cameras:
 
 def mirror_views(views: SourceViews) -> SourceViews:
     """Views of the character mirrored in the plane x = 0: one from its left becomes one from its right."""
-    return replace(views, images=views.images.flip(-1), cameras=mirror_cameras(views.cameras))
+    widened = views.widened_alphas
+    return replace(
+        views,
+        images=views.images.flip(-1),
+        cameras=mirror_cameras(views.cameras),
+        widened_alphas=None if widened is None else widened.flip(-1),
+    )
 
 
 def to_camera_frame(cameras: Cameras, points: Tensor) -> Tensor:

@@ -36,7 +36,8 @@ def build_hull(
 ) -> Hull:
     """Carve the hulls of a batch of characters from the silhouettes of their source views.
 
-    Mirrored views carve nothing (that a character is symmetric is a guess); they get their maps.
+    Mirrored views carve nothing (that a character is symmetric is a guess); they get their maps. Views that were reconciled
+    say by `widened_alphas` how far each may be off, row by row: such silhouettes are not widened any further.
 
     Args:
         views: Source views (B, V).
@@ -110,14 +111,16 @@ def _carve(
     views: SourceViews, box_min: Tensor, box_max: Tensor, grid_size: int, dilation: float, coverage: float
 ) -> Hull:
     """Carve one character (views without the B axis)."""
-    masks = views.images[:, 3] > MASK_ALPHA
+    masks, limits = views.images[:, 3] > MASK_ALPHA, views.carving_alphas > MASK_ALPHA
+    if views.widened_alphas is not None:
+        coverage = 0.0
     carving = (views.present & ~views.mirrored).nonzero()[:, 0].tolist()
     for view in carving:
-        if not bool(masks[view].any()):
+        if not bool(limits[view].any()):
             raise DataError(
                 f"source view {view}: found an empty silhouette (alpha is 0 everywhere), expected a figure."
             )
-    outside = torch.stack([_distance_to(mask) for mask in masks])
+    outside = torch.stack([_distance_to(limit) for limit in limits])
     dilations = torch.full((len(masks),), float(dilation), device=masks.device)
     while True:
         radii = dilations[carving]
@@ -142,6 +145,8 @@ def _carve(
         dilations = torch.where(dilations > 0, 2.0 * dilations, torch.ones_like(dilations))
         log.warning("Drawings disagree: the hull misses parts of source views %s; silhouettes widened to %.0f pixels.",
                     missed, float(dilations.max()))  # fmt: skip
+    if views.widened_alphas is not None:
+        outside = torch.stack([_distance_to(mask) for mask in masks])
     fronts, edges = _view_maps(hull, views.cameras, masks, outside)
     return Hull(occupancy, low, high, fronts, edges, dilations)
 

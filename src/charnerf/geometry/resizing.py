@@ -40,4 +40,8 @@ def resized_views(views: SourceViews, width: int) -> SourceViews:
     )
     straight = (flat[:, :3] / flat[:, 3:].clamp_min(1e-6)).clamp(0.0, 1.0)
     images = torch.cat((straight, flat[:, 3:]), dim=1).unflatten(0, views.present.shape)
-    return replace(views, images=images, cameras=resized_cameras(views.cameras, width, height))
+    widened = views.widened_alphas
+    if widened is not None:
+        widened = resized_pictures(widened, width, height).clamp(0.0, 1.0)
+    cameras = resized_cameras(views.cameras, width, height)
+    return replace(views, images=images, cameras=cameras, widened_alphas=widened)

@@ -83,7 +83,7 @@ class ViewMaps:
         carving, shown = (~views.mirrored).nonzero()[:, 0], None
         if coverage:
             dilations = None if hull is None else hull.dilations[present]
-            alphas = widened_coverage(views.images[:, 3:], dilations)
+            alphas = widened_coverage(views.carving_alphas[:, None], dilations)
             pictures = torch.cat((pictures, alphas), dim=1)
             shown = F.max_pool2d(alphas[carving, 0], 2, stride=1) > 0.0
         pictures, rows, size = _with_hull_maps(pictures, hull, present)

@@ -9,7 +9,7 @@ import numpy as np
 from charnerf.reconciling.agreement import disagreement, iou, share_apart
 from charnerf.reconciling.heights import row_offsets
 from charnerf.reconciling.registration import SIDE, filled, find_flow, premultiplied, resized, warped
-from charnerf.reconciling.tolerance import tolerances
+from charnerf.reconciling.tolerance import TOLERANCES, tolerances, widened
 
 AGREES = (
     0.002  # share of two outlines' pixels that may lie apart where views are left as they are, bit for bit
@@ -17,7 +17,7 @@ AGREES = (
 LEAST_IOU = (
     0.75  # of a moved outline with its partner's; below, the poses are too unlike for colours to be trusted
 )
-OPPOSITE = 5.0  # degrees by which two azimuths may miss 180 and still be seen from opposite sides
+OPPOSITE = 5.0  # degrees by which azimuths may miss 180, and elevations 0, and still be opposite, and level
 COPY = 0.03  # mean difference of colours below which two drawings are one and the same
 
 
@@ -81,20 +81,34 @@ class Reconciliation:
             mended.append(_moved(canvas, flow, None if view.partner is None else mended[view.partner]))
         return mended
 
+    def widened_alphas(self, mended: Sequence[np.ndarray]) -> np.ndarray | None:
+        """What hulls of reconciled canvases (S, S, 4) are to be carved from, (V, S, S); None where outlines agree."""
+        if all((one.tolerance == TOLERANCES[0]).all() for one in self.views):
+            return None
+        pairs = zip(mended, self.views, strict=True)
+        return np.stack([widened(canvas[..., 3], one.tolerance) for canvas, one in pairs])
 
-def reconcile(canvases: Sequence[np.ndarray], azimuths_deg: Sequence[float]) -> Reconciliation:
+
+def reconcile(
+    canvases: Sequence[np.ndarray],
+    azimuths_deg: Sequence[float],
+    elevations_deg: Sequence[float] | None = None,
+) -> Reconciliation:
     """Find how views of one character are made to agree.
 
     Args:
         canvases: RGBA (S, S, 4) each, float32 in [0, 1], straight alpha, on one scale, floor line and axis; the first rules,
             then the second, and so on.
-        azimuths_deg: Of their cameras, level.
+        azimuths_deg: Of their cameras.
+        elevations_deg: Of their cameras, 0 if not given. What is seen from above or below has no rows in common with
+            the others: it is left as it is, and only colours where those had to be mended.
 
     Returns:
         Nothing to do where views agree.
     """
     drawn = [resized(canvas, SIDE) for canvas in canvases]
-    partners = [_partner(azimuths_deg, index) for index in range(len(drawn))]
+    level = np.abs(np.zeros(len(drawn)) if elevations_deg is None else np.asarray(elevations_deg)) <= OPPOSITE
+    partners = [_partner(azimuths_deg, index, level) for index in range(len(drawn))]
     flows: list[np.ndarray | None] = []
     mended: list[np.ndarray] = []
     for index, (picture, partner) in enumerate(zip(drawn, partners, strict=True)):
@@ -103,9 +117,10 @@ def reconcile(canvases: Sequence[np.ndarray], azimuths_deg: Sequence[float]) -> 
             agrees = share_apart(target[..., 3], picture[..., 3]) <= AGREES
             flows.append(None if agrees else find_flow(target, picture))
         else:
-            flows.append(None if index == 0 else _vertical(row_offsets(mended[0], picture)))
+            comparable = index > 0 and level[0] and level[index]
+            flows.append(_vertical(row_offsets(mended[0], picture)) if comparable else None)
         mended.append(_moved(picture, flows[index], None if partner is None else mended[partner]))
-    allowed = tolerances([picture[..., 3] for picture in mended], azimuths_deg)
+    allowed = _allowed([picture[..., 3] for picture in mended], azimuths_deg, level)
     views = [
         _agreement(picture, flow, partner, mended, _copied(drawn, index), allowed[index])
         for index, (picture, flow, partner) in enumerate(zip(drawn, flows, partners, strict=True))
@@ -158,10 +173,22 @@ def _vertical(offsets: np.ndarray | None) -> np.ndarray | None:
     return np.stack((down, np.zeros_like(down)))
 
 
-def _partner(azimuths_deg: Sequence[float], index: int) -> int | None:
-    """The first earlier view from the opposite side."""
+def _partner(azimuths_deg: Sequence[float], index: int, level: np.ndarray) -> int | None:
+    """The first earlier view from the opposite side; None for views from above or below."""
     turns = [(azimuths_deg[index] - azimuth) % 360.0 for azimuth in azimuths_deg[:index]]
-    return next((i for i, turn in enumerate(turns) if abs(turn - 180.0) <= OPPOSITE), None)
+    opposite = (i for i, turn in enumerate(turns) if level[i] and abs(turn - 180.0) <= OPPOSITE)
+    return next(opposite, None) if level[index] else None
+
+
+def _allowed(outlines: Sequence[np.ndarray], azimuths_deg: Sequence[float], level: np.ndarray) -> np.ndarray:
+    """Tolerances (V, SIDE) of all views; one from above or below carves where the level ones agree, else not at all."""
+    rows = np.flatnonzero(level)
+    found = np.full((len(outlines), SIDE), TOLERANCES[0])
+    if len(rows) > 1:
+        found[rows] = tolerances([outlines[i] for i in rows], [azimuths_deg[i] for i in rows])
+        if (found[rows] > TOLERANCES[0]).any():
+            found[~level] = np.inf
+    return found
 
 
 def _copied(pictures: Sequence[np.ndarray], index: int) -> int | None:

@@ -15,6 +15,7 @@ from scipy import ndimage
 CELLS = 128
 TOLERANCES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # pixels of 128, tried in turn
 LOST = 0.02  # share of a row's pixels that may be cut before it is widened; a single pixel never matters
+EDGE = 0.05  # alpha from which on a pixel belongs to a figure that is grown, as to one that is carved
 SPREAD = 1  # rows beside a widened one that are widened too
 
 
@@ -37,6 +38,24 @@ def tolerances(outlines: Sequence[np.ndarray], azimuths_deg: Sequence[float]) ->
     for view in range(len(masks)):
         found[view], cells = _let_in(view, cells, masks, distances, columns)
     return found
+
+
+def widened(alpha: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
+    """An outline with its figure grown, in each row, to what the row may be off.
+
+    Args:
+        alpha: (S, S), any S.
+        tolerance: Of the view, by row, (T,), pixels of 128.
+
+    Returns:
+        (S, S): 1 within the tolerance of the figure, the alpha itself in rows that need none, 1 everywhere where it is
+        infinite.
+    """
+    side = len(alpha)
+    rows = tolerance[(np.arange(side) + 0.5).astype(int) * len(tolerance) // side]
+    reach = ((rows - TOLERANCES[0]) * (side / 128.0))[:, None]
+    near = ndimage.distance_transform_edt(alpha <= EDGE) <= reach
+    return np.where((reach > 0.0) & near, 1.0, alpha).astype(alpha.dtype)
 
 
 def _let_in(

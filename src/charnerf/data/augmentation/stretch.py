@@ -96,9 +96,13 @@ def stretch_views(views: SourceViews, scales: Tensor) -> SourceViews:
     resampled = _widen(torch.cat((rgb * alpha, alpha), dim=2), across, cameras, padding="zeros")
     alpha = resampled[:, :, 3:]
     images = torch.cat((resampled[:, :, :3] / alpha.clamp_min(1e-4), alpha), dim=2).clamp(0.0, 1.0)
+    widened = views.widened_alphas
+    if widened is not None:
+        widened = _widen(widened[:, :, None], across, cameras, padding="border")[:, :, 0]
     pose = cameras.world_from_camera.clone()
     pose[..., :3, 3] = pose[..., :3, 3] * scales
-    return replace(views, images=images, cameras=replace(cameras, world_from_camera=pose))
+    cameras = replace(cameras, world_from_camera=pose)
+    return replace(views, images=images, cameras=cameras, widened_alphas=widened)
 
 
 def _across(cameras: Cameras, scales: Tensor) -> Tensor:

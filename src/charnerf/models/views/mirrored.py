@@ -27,7 +27,7 @@ class MirroredSide(AbstractViews):
         if len(columns) == 0:
             return views
         side = mirror_views(views[:, columns])
-        cameras = views.cameras
+        cameras, widened = views.cameras, views.widened_alphas
 
         def appended(name: str) -> Tensor:
             return torch.cat((getattr(cameras, name), getattr(side.cameras, name)), dim=1)
@@ -44,4 +44,5 @@ class MirroredSide(AbstractViews):
             ),
             present=torch.cat((views.present, side.present & sideways[:, columns]), dim=1),
             mirrored=torch.cat((views.mirrored, torch.ones_like(side.mirrored)), dim=1),
+            widened_alphas=None if widened is None else torch.cat((widened, side.carving_alphas), dim=1),
         )
