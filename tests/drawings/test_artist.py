@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 import torch
+import trimesh
 
+from charnerf.capture.character import CaptureOptions
+from charnerf.capture.dataset import capture_dataset
 from charnerf.config.options import option
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawings
-from charnerf.drawings.redrawn import redrawn
+from charnerf.drawings.redrawn import VIEW_SHARES, redrawn, with_drawn_sources
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import ConfigError
+from charnerf.surfaces.mesh_files import load_surface_mesh
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +80,24 @@ def test_a_redrawn_character_keeps_its_truth(character):
     assert torch.equal(back, front.flip(-1)), "reconciled: the back takes the mirrored front's outline"
     loose = redrawn(character, level=2, seed=0, size=64, reconciled=False).sources.images[0]
     assert not torch.equal(loose[2, 3], loose[0, 3].flip(-1))
+
+
+def test_training_characters_get_drawings_of_some_usual_views(character, figure_dataset, tmp_path):
+    """Copies of a mesh: their targets are as captured, their source views drawn, and the seed says how."""
+    mesh = tmp_path / "figure.obj"
+    surface = load_surface_mesh(character.mesh_file)
+    trimesh.Trimesh(
+        surface.triangles.reshape(-1, 3), np.arange(3 * len(surface.triangles)).reshape(-1, 3)
+    ).export(mesh)
+    options = CaptureOptions(views=2, size=32)
+    for root in ("first", "again"):
+        capture_dataset([mesh], tmp_path / root, "train", options=options, drawn=3, draw=with_drawn_sources,
+                        seed=4, processes=1, up="z", facing="-y")  # fmt: skip
+    for number in (1, 2, 3):
+        one, other = (load_character(tmp_path / root, f"figure+d{number}") for root in ("first", "again"))
+        assert torch.equal(one.sources.images, other.sources.images)
+        names = tuple("left" if name == "side" else name for name in one.source_names)
+        assert set(names) in map(set, VIEW_SHARES)
+        assert one.images([0, 1]).shape == (2, 32, 32, 4) and one.mesh_file.is_file()
+        colors = one.sources.images[0, 0, :3][:, one.sources.images[0, 0, 3] > 0.5]
+        assert len(colors.T.unique(dim=0)) > 1, "ink beside paint"

@@ -213,3 +213,34 @@ def test_batches_of_characters_are_carved_one_by_one():
         alone = carve(views, grid_size=32)
         for name in ("occupancy", "box_min", "box_max", "front_depths", "edge_distances", "dilations"):
             assert torch.equal(getattr(together, name)[index], getattr(alone, name)[0])
+
+
+def test_a_view_that_only_colors_carves_nothing():
+    """With a back widened to everything the hull is that of front and side; the maps of its own outline stay."""
+    views = views_of(FIGURES["lefty"])
+    widened = views.carving_alphas.clone()
+    widened[:, 2] = 1.0
+    found = carve(replace(views, widened_alphas=widened), grid_size=64)
+    assert torch.equal(found.occupancy, carve(views[:, :2], grid_size=64).occupancy)
+    assert torch.equal(found.edge_distances, carve(views, grid_size=64).edge_distances)
+
+
+def test_rows_are_widened_where_drawings_disagree_and_nowhere_else():
+    """A back that lacks an arm loses it; widened in the arm's rows alone, what was lost comes back and no other row changes."""
+    views = views_of(FIGURES["lefty"], size=64)
+    images = views.images.clone()
+    agreed = carve(views, grid_size=64)[0]
+    rows = (views.images[0, 0, 3] > 0.5).sum(-1)
+    arms = rows > rows.max() // 2
+    images[0, 2, 3, arms, 40:] = 0.0
+    images[0, 2, 3, arms, :24] = 0.0
+    lacking = replace(views, images=images)
+    widened = lacking.carving_alphas.clone()
+    widened[0, 2, arms] = 1.0
+    settings = {"grid_size": 64, "coverage": 0.0}
+    cut, kept = carve(lacking, **settings)[0], carve(replace(lacking, widened_alphas=widened), **settings)[0]
+    points = helpers.surface_points(FIGURES["lefty"], 4000).float()
+    assert not hull_contains(cut, points).all() and hull_contains(kept, points).all()
+    below = points[points[:, 2] < 0.8]
+    assert torch.equal(hull_contains(kept, below), hull_contains(agreed, below))
+    assert (kept.dilations == 1.0).all(), "no silhouette is widened as a whole beside that"

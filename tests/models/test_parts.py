@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from charnerf.errors import ConfigError
-from charnerf.geometry.cameras import mirror_cameras
+from charnerf.geometry.cameras import mirror_cameras, mirror_views
+from charnerf.geometry.resizing import resized_views
 from charnerf.models.features.image import ImageFeatures
 from charnerf.models.features.image_hull import ImageHullFeatures
 from charnerf.models.features.image_hull_section import ImageHullSectionFeatures
@@ -239,3 +240,16 @@ def test_in_a_batch_only_the_characters_own_sides_are_mirrored():
     used = MirroredSide()(SourceViews(pair("images"), cameras, pair("present"), pair("mirrored")))
     assert used.present.tolist() == [[True, True, False, True], [True, True, True, False]]
     assert used.mirrored.tolist() == [[False, False, True, True]] * 2
+
+
+def test_what_is_carved_from_follows_its_views():
+    """Mirrored, resized and joined by the mirrored side view."""
+    views = helpers.source_views(helpers.person(symmetric=False), helpers.source_cameras((0.0, 90.0)))
+    widened = views.carving_alphas.clone()
+    widened[:, 1] = 1.0
+    given = replace(views, widened_alphas=widened)
+    assert torch.equal(mirror_views(given).carving_alphas, widened.flip(-1))
+    used = MirroredSide()(given)
+    assert torch.equal(used.carving_alphas[:, :2], widened) and used.carving_alphas.shape[1] == 3
+    small = resized_views(given, 16)
+    assert small.carving_alphas.shape[-1] == 16 and (small.carving_alphas[:, 1] == 1.0).all()

@@ -156,3 +156,29 @@ def test_disagreement_counts_what_is_far():
     )  # 9 of 10 columns on either side are farther than a pixel
     assert share_apart(first, np.zeros_like(first)) == 1.0
     assert iou(first, moved) == pytest.approx(30 / 50)
+
+
+def test_what_hulls_are_carved_from_is_given_only_where_views_disagree():
+    agreeing = [figure(), mirrored(figure())]
+    assert reconcile(agreeing, [0.0, 180.0]).widened_alphas(agreeing) is None
+    side = figure()
+    side[:30] = 0.0  # no head
+    views = [figure(), side]
+    found = reconcile(views, [0.0, 90.0])
+    widened = found.widened_alphas(found.apply(views))
+    assert widened is not None and np.array_equal(widened[0], views[0][..., 3])
+    assert (widened[1] >= found.apply(views)[1][..., 3]).all()
+    assert widened[1][:30].sum() > 0
+
+
+def test_a_view_from_above_is_left_as_it_is_and_carves_only_where_the_others_agree():
+    above = figure(stretch=0.8)
+    agreeing = [figure(), mirrored(figure()), above]
+    found = reconcile(agreeing, [0.0, 180.0, 45.0], [0.0, 0.0, 40.0])
+    assert found.apply(agreeing)[2] is above and found.widened_alphas(agreeing) is None
+    headless = figure()
+    headless[:30] = 0.0
+    views = [figure(), headless, above]
+    found = reconcile(views, [0.0, 90.0, 180.0], [0.0, 0.0, 40.0])
+    widened = found.widened_alphas(found.apply(views))
+    assert found.views[2].partner is None and widened is not None and (widened[2] == 1.0).all()

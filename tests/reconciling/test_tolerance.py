@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from charnerf.reconciling.tolerance import TOLERANCES, tolerances
+from charnerf.reconciling.tolerance import TOLERANCES, tolerances, widened
 
 BASE, S = TOLERANCES[0], 128
 
@@ -53,3 +53,20 @@ def test_a_view_of_something_else_carves_nothing():
 
 def test_a_three_quarter_view_of_a_cylinder_agrees():
     assert (tolerances([BODY, BODY, bar((20, 120, 50, 78))], [0.0, 90.0, 45.0]) == BASE).all()
+
+
+def test_outlines_grow_by_their_rows_tolerance():
+    """A body of 20 columns in rows of which some may be off by 4 pixels; at twice the size by twice as many."""
+    rows = np.full(S, BASE)
+    rows[50:60] = BASE + 4.0
+    for factor in (1, 2):
+        alpha = np.kron(BODY, np.ones((factor, factor)))
+        grown = widened(alpha, rows)
+        counts = grown.sum(axis=1)
+        assert counts[50 * factor] == (20 + 2 * 4) * factor
+        assert np.array_equal(grown[: 50 * factor], alpha[: 50 * factor])
+        assert np.array_equal(grown[60 * factor :], alpha[60 * factor :])
+
+
+def test_a_view_that_carves_nothing_grows_to_everything():
+    assert (widened(BODY, np.full(S, np.inf)) == 1.0).all()

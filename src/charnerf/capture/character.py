@@ -1,5 +1,6 @@
 """One character captured: pictures of its surface from all around, and its source views."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -93,7 +94,7 @@ def capture_character(
     return CapturedCharacter(pictures=pictures, surface=surface)
 
 
-def capture_sources(surface: SurfaceMesh, size: int) -> np.ndarray:
-    """Orthographic source views of a surface, front, side and back, RGBA uint8 (3, size, size, 4)."""
-    shots = Studio(surface, Unlit()).shoot(source_cameras(radius=surface.framing_radius, size=size))
-    return np.stack([shot.rgba for shot in shots])
+def capture_sources(surface: SurfaceMesh, size: int, azimuths_deg: Sequence[float]) -> np.ndarray:
+    """Orthographic source views of a surface, level at azimuths, RGBA uint8 (V, size, size, 4)."""
+    cameras = source_cameras(radius=surface.framing_radius, size=size, azimuths_deg=azimuths_deg)
+    return np.stack([shot.rgba for shot in Studio(surface, Unlit()).shoot(cameras)])

@@ -17,12 +17,18 @@ from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_sce
 from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
 from charnerf.capture.variants import SEPARATOR, variant
-from charnerf.data.characters import remove_partial_characters, write_character
+from charnerf.data.characters import CharacterPictures, remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.surfaces.mesh_files import write_surface_mesh
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import SurfaceMesh
+
+VARIED_SHARE = 0.7  # of drawn copies: seven of ten variants hold their arms down, half of turnarounds do
+_STREAMS = {"": (), "s": (1,), "d": (2,)}  # further seeds of what each kind is drawn from
+
+DrawSources = Callable[..., CharacterPictures]
+"""Called with pictures, surface and rng, returns the pictures with drawings for source views."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,8 @@ def capture_dataset(
     facing: str | None = None,
     variants: int = 0,
     swaps: int = 0,
+    drawn: int = 0,
+    draw: DrawSources | None = None,
     seed: int = 0,
     processes: int | None = None,
 ) -> CaptureReport:
@@ -63,7 +71,10 @@ def capture_dataset(
         variants: Of each mesh, captured instead of it (capture/variants.py): NAME+1, NAME+2, ...
         swaps: Characters with each mesh's body and other meshes' heads and legs, instead of it (capture/part_swaps.py):
             NAME+s1, NAME+s2, ...
-        seed: What variants and swaps are drawn from; the same seed gives the same ones, however many.
+        drawn: Copies of each mesh whose source views are drawings, seven of ten of them variants, instead of it: NAME+d1,
+            NAME+d2, ...
+        draw: Makes their drawings.
+        seed: What variants, swaps and drawings are drawn from; the same seed gives the same ones, however many.
         processes: Worker processes; None for one a core.
 
     Returns:
@@ -78,19 +89,31 @@ def capture_dataset(
     check_name("split", split)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
-    items = _items(files, variants, swaps)
+    items = _items(files, variants, swaps, drawn)
     refuse_taken_names(open_or_new(root), [item.name for item in items])
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
     work = partial(
-        _capture_item, root=root, options=options, donors=sorted(files), up=up, facing=facing, seed=seed
+        _capture_item,
+        root=root,
+        options=options,
+        donors=sorted(files),
+        draw=draw,
+        up=up,
+        facing=facing,
+        seed=seed,
     )
     add = partial(add_to_split, root, split, made_by=made_by(options))
     return _capture_items(items, work, add, root=root, processes=processes)
 
 
 def capture_scene_to(
-    root: str | Path, name: str, scene: trimesh.Scene | trimesh.Trimesh | SurfaceMesh, options: CaptureOptions
+    root: str | Path,
+    name: str,
+    scene: trimesh.Scene | trimesh.Trimesh | SurfaceMesh,
+    options: CaptureOptions,
+    *,
+    draw: Callable[[CharacterPictures, SurfaceMesh], CharacterPictures] | None = None,
 ) -> Path:
     """Capture one scene that stands in the world frame; dataset.json is left to `layout.add_to_split`.
 
@@ -99,6 +122,7 @@ def capture_scene_to(
         name: The character's name.
         scene: World frame.
         options: How.
+        draw: Puts drawings in the place of the captured source views.
 
     Returns:
         The character's folder.
@@ -107,8 +131,9 @@ def capture_scene_to(
         DataError: If the name is taken or the scene has no triangles.
     """
     captured = capture_character(scene, options)
+    pictures = captured.pictures if draw is None else draw(captured.pictures, captured.surface)
     return write_character(
-        root, name, captured.pictures, write_mesh=partial(write_surface_mesh, mesh=captured.surface)
+        root, name, pictures, write_mesh=partial(write_surface_mesh, mesh=captured.surface)
     )
 
 
@@ -150,24 +175,23 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Item:
-    """A mesh file, as it is (0), one of its variants, or one of its exchanges of parts."""
+    """A mesh file, as it is (0), one of its variants (""), exchanges of parts ("s") or drawn copies ("d")."""
 
     file: Path
     number: int = 0
-    swapped: bool = False
+    kind: str = ""
 
     @property
     def name(self) -> str:
-        kind = "s" if self.swapped else ""
-        return f"{self.file.stem}{SEPARATOR}{kind}{self.number}" if self.number else self.file.stem
+        return f"{self.file.stem}{SEPARATOR}{self.kind}{self.number}" if self.number else self.file.stem
 
 
-def _items(files: Sequence[Path], variants: int, swaps: int) -> list[_Item]:
-    """What is captured: the files, or so many variants and exchanges of each."""
+def _items(files: Sequence[Path], variants: int, swaps: int, drawn: int) -> list[_Item]:
+    """What is captured: the files, or so many variants, exchanges and drawn copies of each."""
     items = []
     for file in files:
-        items += [_Item(file, number) for number in range(1, variants + 1)]
-        items += [_Item(file, number, swapped=True) for number in range(1, swaps + 1)]
+        for kind, count in (("", variants), ("s", swaps), ("d", drawn)):
+            items += [_Item(file, number, kind) for number in range(1, count + 1)]
     return items or [_Item(file) for file in files]
 
 
@@ -206,6 +230,7 @@ def _capture_item(
     root: Path,
     options: CaptureOptions,
     donors: Sequence[Path],
+    draw: DrawSources | None,
     up: str | None,
     facing: str | None,
     seed: int,
@@ -214,14 +239,20 @@ def _capture_item(
     try:
         surface = surface_of_scene(load_scene(item.file, up, facing))
         drawn_from = [seed, zlib.crc32(item.file.stem.encode()), item.number]
-        if item.swapped:
-            rng = np.random.default_rng([*drawn_from, 1])
+        rng = np.random.default_rng([*drawn_from, *_STREAMS[item.kind]])
+        if item.kind == "s":
             others = [donors[index] for index in rng.integers(len(donors), size=2)]
             parts = [surface_of_scene(load_scene(other, up, facing)) for other in others]
             surface = swap_parts([surface, *parts], rng)
-        elif item.number:
-            surface = variant(surface, np.random.default_rng(drawn_from))
-        capture_scene_to(root, item.name, surface, options)
+        elif item.number and (item.kind == "" or rng.random() < VARIED_SHARE):
+            surface = variant(surface, rng)
+        capture_scene_to(
+            root,
+            item.name,
+            surface,
+            options,
+            draw=partial(draw, rng=rng) if draw and item.kind == "d" else None,
+        )
     except CharNeRFError as err:
         return str(err)
     return None

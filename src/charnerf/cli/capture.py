@@ -39,7 +39,15 @@ Swaps = Annotated[
         help="Capture so many characters with each mesh's body and other given meshes' heads and legs: NAME+s1, ...",
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="The same seed gives the same variants and swaps.")]
+Drawn = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        help="Capture so many copies of each mesh whose source views are drawings that disagree, for training, instead of"
+        " it: NAME+d1, ...",
+    ),
+]
+Seed = Annotated[int, typer.Option(min=0, help="The same seed gives the same variants, swaps and drawings.")]
 
 
 def command(
@@ -56,6 +64,7 @@ def command(
     depth: Depth = False,
     variants: Variants = 0,
     swaps: Swaps = 0,
+    drawn: Drawn = 0,
     seed: Seed = 0,
     jobs: Jobs = None,
 ) -> None:
@@ -68,6 +77,7 @@ def command(
     from charnerf.capture.dataset import capture_dataset
     from charnerf.capture.lights import Headlight, Unlit
     from charnerf.data.digest import split_digest
+    from charnerf.drawings.redrawn import with_drawn_sources
 
     shown = Unlit() if light == "unlit" else Headlight()
     done = capture_dataset(
@@ -77,6 +87,8 @@ def command(
         options=CaptureOptions(views=views, size=size, sources=sources, depth=depth, light=shown),
         variants=variants,
         swaps=swaps,
+        drawn=drawn,
+        draw=with_drawn_sources if drawn else None,
         seed=seed,
         processes=jobs,
         up=up,

@@ -1,19 +1,21 @@
 """Drawings of a data set's characters: what somebody would have drawn of them, on paper."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 from PIL import Image
+from torch import Tensor
 
 from charnerf.capture.character import capture_sources
 from charnerf.capture.poses import find_joints, random_pose, reposed
 from charnerf.data.characters import Character
 from charnerf.data.drawing_style import draw_pictures, random_style
 from charnerf.errors import ConfigError
-from charnerf.geometry.framing import SOURCE_ORDER
+from charnerf.geometry.framing import SOURCE_AZIMUTHS, SOURCE_ORDER
 from charnerf.pictures import save_png, to_bytes
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.surface_mesh import SurfaceMesh
@@ -68,33 +70,59 @@ def draw_character(character: Character, *, size: int, seed: int, level: int = 1
         raise ConfigError(f"level: found {level}, expected 0 to {len(LEVELS) - 1}.")
     mistakes = LEVELS[level]
     digest = hashlib.sha256(f"{seed} {character.name}".encode()).digest()
-    generator = torch.Generator().manual_seed(int.from_bytes(digest[:7], "little"))
+    rng = np.random.default_rng(int.from_bytes(digest[7:15], "little"))
     if character.mesh_file is None:
         names, images = character.source_names, character.sources.images[0]
     else:
         names = SOURCE_ORDER
-        pictures = _captured(load_surface_mesh(character.mesh_file), size, mistakes, digest)
-        images = torch.from_numpy(pictures).permute(0, 3, 1, 2).float() / 255.0
-    if level > 0:
+        surface = load_surface_mesh(character.mesh_file)
+        images = captured(surface, tuple(SOURCE_AZIMUTHS.values()), size=size, mistakes=mistakes, rng=rng)
+    pixels = on_paper(images, mistakes, seed=int.from_bytes(digest[:7], "little"))
+    return dict(zip(names, pixels, strict=True))
+
+
+def captured(
+    surface: SurfaceMesh,
+    azimuths_deg: Sequence[float],
+    *,
+    size: int,
+    mistakes: Mistakes,
+    rng: np.random.Generator,
+) -> Tensor:
+    """What somebody has in mind who draws a surface view by view: all but the first in poses of their own, framed as they are.
+
+    Returns:
+        RGBA (V, 4, size, size) in [0, 1], straight alpha.
+    """
+    limbs, head = np.radians(mistakes.limbs_deg), np.radians(mistakes.head_deg)
+    if limbs or head:
+        joints = find_joints(surface)
+        poses = [
+            surface,
+            *(reposed(surface, joints, random_pose(rng, limbs=limbs, head=head)) for _ in azimuths_deg[1:]),
+        ]
+        views = [
+            capture_sources(pose, size, (azimuth,)) for pose, azimuth in zip(poses, azimuths_deg, strict=True)
+        ]
+        pictures = np.concatenate(views)
+    else:
+        pictures = capture_sources(surface, size, azimuths_deg)
+    return torch.from_numpy(pictures).permute(0, 3, 1, 2).float() / 255.0
+
+
+def on_paper(images: Tensor, mistakes: Mistakes, *, seed: int) -> np.ndarray:
+    """Views (V, 4, S, S) drawn in one style, each with mistakes of its own; as they are where there are none.
+
+    Returns:
+        RGB uint8 (V, S, S, 3).
+    """
+    if mistakes.wobble or mistakes.shift or mistakes.scale:
+        generator = torch.Generator().manual_seed(seed)
         style = random_style(generator, wobble=mistakes.wobble, shift=mistakes.shift, scale=mistakes.scale)
         images = draw_pictures(images, style, generator)
     paper = torch.tensor(PAPER)[:, None, None] / 255.0
     rgb = images[:, :3] * images[:, 3:] + paper * (1.0 - images[:, 3:])
-    return dict(zip(names, to_bytes(rgb.permute(0, 2, 3, 1)), strict=True))
-
-
-def _captured(surface: SurfaceMesh, size: int, mistakes: Mistakes, digest: bytes) -> np.ndarray:
-    """Source views RGBA uint8 (V, size, size, 4); all but the front in poses of their own, framed as they are."""
-    pictures = capture_sources(surface, size)
-    if not mistakes.limbs_deg and not mistakes.head_deg:
-        return pictures
-    rng = np.random.default_rng(int.from_bytes(digest[7:15], "little"))
-    joints = find_joints(surface)
-    limbs, head = np.radians(mistakes.limbs_deg), np.radians(mistakes.head_deg)
-    for view in range(1, len(pictures)):
-        pose = random_pose(rng, limbs=limbs, head=head)
-        pictures[view] = capture_sources(reposed(surface, joints, pose), size)[view]
-    return pictures
+    return to_bytes(rgb.permute(0, 2, 3, 1))
 
 
 def write_drawings(drawings: dict[str, np.ndarray], folder: Path) -> list[Path]:

@@ -2,12 +2,24 @@
 
 from dataclasses import replace
 
-from charnerf.data.characters import Character
-from charnerf.drawings.artist import draw_character
+import numpy as np
+
+from charnerf.data.characters import Character, CharacterPictures
+from charnerf.drawings.artist import LEVELS, captured, draw_character, on_paper
 from charnerf.drawings.turnaround import read_views
-from charnerf.drawings.viewpoints import turnaround
+from charnerf.drawings.viewpoints import Viewpoint, turnaround, viewpoint
+from charnerf.pictures import to_bytes
+from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 SIDE = 384  # pixels of the drawings: three of theirs to one that the model reads
+LEVEL_SHARES = {1: 0.35, 2: 0.4, 3: 0.25}  # of training's drawings
+VIEW_SHARES = {  # of training's turnarounds, by the views that they have
+    ("front", "left"): 0.15,
+    ("front", "left", "back"): 0.45,
+    ("front", "right", "back"): 0.1,
+    ("front", "left", "back", "right"): 0.15,
+    ("front", "left", "back", "three-quarter-front"): 0.15,
+}
 
 
 def redrawn(character: Character, *, level: int, seed: int, size: int, reconciled: bool = True) -> Character:
@@ -29,3 +41,39 @@ def redrawn(character: Character, *, level: int, seed: int, size: int, reconcile
     front, side, back = draw_character(character, size=SIDE, seed=seed, level=level).values()
     read = read_views(turnaround(front, side, back), size=size, reconciled=reconciled)
     return replace(character, sources=read.views)
+
+
+def with_drawn_sources(
+    pictures: CharacterPictures, surface: SurfaceMesh, rng: np.random.Generator
+) -> CharacterPictures:
+    """Captured pictures with drawings of some of the usual views for source views, for training.
+
+    Level and views are drawn by LEVEL_SHARES and VIEW_SHARES; the drawings are read, aligned and reconciled as a user's are.
+
+    Args:
+        pictures: As captured; targets stay.
+        surface: What was captured, in the pose of the front view.
+        rng: What all is drawn from.
+
+    Raises:
+        DataError: If a drawing can not be read.
+    """
+    level = rng.choice(list(LEVEL_SHARES), p=list(LEVEL_SHARES.values()))
+    choices = list(VIEW_SHARES)
+    views = [viewpoint(name) for name in choices[rng.choice(len(choices), p=list(VIEW_SHARES.values()))]]
+    size = pictures.source_images.shape[1]
+    mistakes = LEVELS[level]
+    images = captured(surface, [view.azimuth_deg for view in views], size=SIDE, mistakes=mistakes, rng=rng)
+    drawings = on_paper(images, mistakes, seed=int(rng.integers(2**31)))
+    read = read_views(dict(zip(views, drawings, strict=True)), size=size)
+    return replace(
+        pictures,
+        source_cameras=read.views.cameras[0],
+        source_images=to_bytes(read.views.images[0].permute(0, 2, 3, 1)),
+        source_names=tuple(_stored_name(view) for view in views),
+    )
+
+
+def _stored_name(view: Viewpoint) -> str:
+    """Name of a view in a data set: `side` is what most turnarounds call the left one."""
+    return "side" if view.name == "left" else view.name

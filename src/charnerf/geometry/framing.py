@@ -3,6 +3,8 @@
 A model knows pictures that are framed so; drawings or cameras by another rule would be reconstructed wrong, without an error.
 """
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -59,8 +61,14 @@ def framing_camera(azimuth_deg: float, elevation_deg: float, *, radius: float, s
     return framing_cameras(direction, radius=radius, size=size).to(torch.float32)
 
 
-def source_cameras(*, radius: float, size: int, orthographic: bool = True) -> Cameras:
-    """The drawings' cameras (3,), float64, as `framing_cameras`: level, at SOURCE_AZIMUTHS."""
-    azimuths = torch.tensor(tuple(SOURCE_AZIMUTHS.values()), dtype=torch.float64)
+def source_cameras(
+    *,
+    radius: float,
+    size: int,
+    orthographic: bool = True,
+    azimuths_deg: Sequence[float] = tuple(SOURCE_AZIMUTHS.values()),
+) -> Cameras:
+    """The drawings' cameras (V,), float64, as `framing_cameras`: level, at azimuths; front, side and back if not given."""
+    azimuths = torch.tensor(tuple(azimuths_deg), dtype=torch.float64)
     directions = direction_from_angles(azimuths, torch.zeros_like(azimuths))
     return framing_cameras(directions, radius=radius, size=size, orthographic=orthographic)
