@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.config.hydra_internals import looks_only, read_arguments, split_sweep
+from charnerf.config.hydra_internals import looks_only, options_first, read_arguments, split_sweep
 from charnerf.config.overrides import parse_overrides
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,6 +41,14 @@ def test_a_command_line_is_read_as_hydra_reads_it() -> None:
     assert read.multirun
     assert (read.overrides, read.config_name) == (["seed=0,1"], "other")
     assert not looks_only(read)
+
+
+def test_overrides_may_stand_on_both_sides_of_options() -> None:
+    typed = ["combinator=mean", "-m", "seed=0,1", "-cn", "train", "scale=smoke"]
+    assert read_arguments(typed).overrides == ["combinator=mean", "seed=0,1", "scale=smoke"]
+    assert options_first(typed) == ["-m", "-cn", "train", "combinator=mean", "seed=0,1", "scale=smoke"]
+    for looks in (["seed=1", "--info"], ["seed=1", "--cfg", "job"]):
+        assert options_first(looks) == looks, "--info would take an override behind it"
 
 
 @pytest.mark.parametrize("flag", ["--help", "--cfg=job", "--hydra-help", "--info"])

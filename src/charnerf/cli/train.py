@@ -49,12 +49,13 @@ def _train(arguments: list[str], conf: Path) -> None:
     import hydra
 
     from charnerf.config.grid import grid_command
+    from charnerf.config.hydra_internals import options_first
     from charnerf.errors import GridError
     from charnerf.training.grid import begin_grid, check_grid, is_lost_worker, report_grid
 
     train = hydra.main(version_base="1.3", config_path=str(conf), config_name="train")(run_job)
     grid = grid_command(arguments)
-    sys.argv[1:] = arguments if grid is None else grid.arguments  # where Hydra reads them
+    sys.argv[1:] = options_first(arguments) if grid is None else grid.arguments  # where Hydra reads them
     if grid is None:
         train()
         return

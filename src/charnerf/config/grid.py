@@ -10,7 +10,7 @@ from typing import Any
 from hydra.core.override_parser.types import ChoiceSweep, Override
 from omegaconf import DictConfig, OmegaConf
 
-from charnerf.config.hydra_internals import looks_only, read_arguments
+from charnerf.config.hydra_internals import looks_only, options_first, read_arguments
 from charnerf.config.overrides import parse_overrides
 from charnerf.config.schema import LIST_GROUPS
 
@@ -63,7 +63,7 @@ def grid_command(arguments: Sequence[str]) -> GridCommand | None:
     if swept and SETTABLE[1] not in parsed:
         fixed = ",".join(f"'{key}'" for key in own if key not in swept)
         more.append(f"{SETTABLE[1]}=[{fixed}]")
-    return GridCommand([*arguments, *more], folder)
+    return GridCommand([*options_first(arguments), *more], folder)
 
 
 def _without_order(override: Override) -> str:

@@ -14,8 +14,19 @@ _LOOKS_ONLY = ("help", "hydra_help", "version", "cfg", "info", "shell_completion
 
 
 def read_arguments(arguments: Sequence[str]) -> Namespace:
-    """Read a command line as `hydra.main` does: overrides, multirun, config_name, config_path, config_dir and others."""
-    return get_args_parser().parse_args(list(arguments))
+    """Read a command line: overrides, wherever they stand, multirun, config_name, config_path, config_dir and others."""
+    return get_args_parser().parse_intermixed_args(list(arguments))
+
+
+def options_first(arguments: Sequence[str]) -> list[str]:
+    """A command line as `hydra.main` reads it, which refuses overrides on both sides of an option; help is left as typed."""
+    read = read_arguments(arguments)
+    if looks_only(read):
+        return list(arguments)
+    options = list(arguments)
+    for override in read.overrides:
+        options.remove(override)
+    return [*options, *read.overrides]
 
 
 def looks_only(arguments: Namespace) -> bool:
