@@ -101,7 +101,7 @@ def _views(
 ) -> tuple[dict[int, Viewpoint | None], bool]:
     """View of each figure by its index, None for one that is left out; and whether that is doubtful."""
     count = len(canvases)
-    naming = name_views(canvases) if count <= MOST_NAMED else None
+    naming = name_views(canvases) if not order and count <= MOST_NAMED else None
     if order and len(order) != count:
         raise DataError(
             f"--order: found {len(order)} names ({', '.join(order)}), expected one for each of the {count} figures of"
@@ -115,8 +115,7 @@ def _views(
     views: dict[int, Viewpoint | None] = dict.fromkeys(range(count))
     if order:
         views |= {i: None if name == "-" else _named(name, canvases[i]) for i, name in enumerate(order)}
-    elif not figures or naming is not None:
-        assert naming is not None
+    elif naming is not None:
         views |= dict(enumerate(naming.viewpoints))
     for name, number in figures.items():
         if not 1 <= number <= count:
@@ -124,7 +123,7 @@ def _views(
         wanted = _named(name, canvases[number - 1])
         views |= {i: None for i, view in views.items() if view == wanted}
         views[number - 1] = wanted
-    return views, naming is not None and naming.is_doubtful and not order and not figures
+    return views, naming is not None and naming.is_doubtful and not figures
 
 
 def _named(name: str, canvas: np.ndarray) -> Viewpoint:

@@ -183,7 +183,7 @@ def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[s
             side, other = ("left", "right") if figure.viewpoint.name == "left" else ("right", "left")
             lines.append(
                 f"The side drawing was taken as the character's {side} side: it looks towards the picture's {side}. If it"
-                f" looks the other way, say --side {other}."
+                f" looks the other way, say --side {other}, or of a sheet --figure {other}=N."
             )
     return lines
 
