@@ -302,6 +302,23 @@ def test_train_itself_exits_2(door: list[str], tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+NO_TRAINING = """
+import functools, sys
+from charnerf.training import cells
+cells.run_cell = functools.partial(cells.run_cell, train=lambda cfg, folder: None)
+from charnerf.cli import run
+sys.exit(run(["train", *sys.argv[1:]]))
+"""
+
+
+@pytest.mark.parametrize("typed", [["seed=0,1", "-m"], ["scale=smoke", "-m", "seed=0,1"]], ids=" ".join)
+def test_a_grids_overrides_stand_before_or_after_m(typed: list[str], tmp_path: Path) -> None:
+    command = [sys.executable, "-c", NO_TRAINING, *typed]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    assert len(list(tmp_path.glob("outputs/grid/seed-*/seed-*"))) == 2
+
+
 def test_debug_shows_the_traceback_of_training_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -310,6 +327,23 @@ def test_debug_shows_the_traceback_of_training_too(
     for arguments in (["--debug", "train", "combinator=nope"], ["train", "combinator=nope", "--debug"]):
         assert run(arguments) == 2
         assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("splits.test=tset", r"^splits\.test: split 'tset' does not exist; .* val \(4\), test \(6\)\.$"),
+        ("splits.train=[train,more]", r"splits\.train: split 'more' does not exist"),
+    ],
+)
+def test_a_split_that_is_not_there_is_named_before_any_work(
+    override: str, message: str, conf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Embedded characters are not generated, and no run folder is begun."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(ConfigError, match=message):
+        check_command_line(["scale=smoke", override], conf=conf)
+    assert not list(tmp_path.iterdir())
 
 
 def test_drawings_of_another_size_are_named_before_any_work(

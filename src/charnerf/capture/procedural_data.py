@@ -140,6 +140,10 @@ class ProceduralData(AbstractData):
                 f"data.size: found {generated}, expected scale.image_size = {size}; leave data.size out, or set both."
             )
 
+    def split_sizes(self) -> dict[str, int]:
+        """As they will be generated."""
+        return {split: self._settings[split] for split in SPLITS}
+
     def prepare(self, *, depth: bool = False) -> Path:
         """Generate what is missing; the data set's folder.
 

@@ -65,7 +65,7 @@ def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> N
 
 
 def check_files(cfg: DictConfig) -> None:
-    """Check that the data set, the checkpoint and the weights that a valid config names are there and of its sizes.
+    """Check that the data set, its splits, the checkpoint and the weights that a valid config names are there and of its sizes.
 
     Raises:
         ConfigError: Names each one that is not.
@@ -82,7 +82,9 @@ def check_files(cfg: DictConfig) -> None:
         )
     lines = problems.lines()
     try:
-        instantiate(cfg.data, _convert_="all").check_image_size(cfg.scale.image_size)
+        data = instantiate(cfg.data, _convert_="all")
+        data.check_image_size(cfg.scale.image_size)
+        data.check_splits(**cfg.splits)
     except ConfigError as error:
         lines.append(str(error))
     if lines:

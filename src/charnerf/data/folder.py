@@ -40,6 +40,10 @@ class FolderData(AbstractData):
                 f"`charnerf capture MESHES -o DATASET --split train --size {size}`."
             )
 
+    def split_sizes(self) -> dict[str, int]:
+        """As dataset.json lists them."""
+        return {split: len(names) for split, names in read_dataset(self.root).splits.items()}
+
     def prepare(self, *, depth: bool = False) -> Path:
         """Check that it is a data set and return its folder.
 

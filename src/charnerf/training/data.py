@@ -9,7 +9,6 @@ from omegaconf import DictConfig
 from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.characters import Character
 from charnerf.data.datamodule import MixedDataModule
-from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import PhaseSampler
 from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
@@ -21,17 +20,6 @@ from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.training.clock import RunClock
 
 log = logging.getLogger(__name__)
-
-
-def check_splits(root: Path, splits: DictConfig) -> None:
-    """Check that every split that a run reads has characters; the last is read after training.
-
-    Raises:
-        DataError: If one has none.
-    """
-    info = read_dataset(root)
-    for split in (*splits.train, splits.val, splits.test):
-        names_of(info, split)
 
 
 def build_data(

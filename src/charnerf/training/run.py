@@ -15,7 +15,7 @@ from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
 from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.clock import RunClock
-from charnerf.training.data import build_data, check_splits
+from charnerf.training.data import build_data
 from charnerf.training.finish import finish_run
 from charnerf.training.module import TrainingModule
 from charnerf.training.start import begin
@@ -39,6 +39,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     L.seed_everything(cfg.seed, verbose=False)
     source: AbstractData = build_part(cfg.data)
     source.check_image_size(cfg.scale.image_size)
+    source.check_splits(**cfg.splits)
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
     save_config(folder, cfg)
@@ -46,7 +47,6 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     model = build_model(cfg)
     start = begin(model, cfg) if checkpoint is None else None
     root = source.prepare(depth=needs.depth)
-    check_splits(root, cfg.splits)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = build_module(cfg, model, renderer, losses, clock)
