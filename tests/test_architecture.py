@@ -1,6 +1,7 @@
 """Which room may import which, checked on the source text; the list of floors is the rule."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -130,6 +131,54 @@ def test_settings_of_the_process_belong_to_doors(file: Path) -> None:
     if room_of(file) not in DOORS:
         for line, name in imports_of(file):
             assert not name.startswith("charnerf.process"), f"{file}:{line}: only doors set the process"
+
+
+@pytest.mark.parametrize(
+    ("title", "most", "by_disk"),
+    [("From three PNGs to mesh.glb", 20, []), ("From a mesh file to a batch", 12, ["training/data.py"])],
+)
+def test_a_reader_gets_from_end_to_end(title: str, most: int, by_disk: list[str]) -> None:
+    """CONTRIBUTING's path is short, one before it imports each file, and no two things on it have one name.
+
+    A file that is met by what lies on disk imports what wrote it instead.
+    """
+    text = (ROOT / ".github" / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    section = text.split(f"### {title}\n")[1].split("\n#")[0]
+    numbers, names = zip(*re.findall(r"^(\d+)\. `([\w/]+\.py)`: ", section, re.MULTILINE), strict=True)
+    assert list(map(int, numbers)) == list(range(1, len(names) + 1))
+    assert len(names) <= most
+    files = [PACKAGE / name for name in names]
+    unmet = [
+        name
+        for index, name in enumerate(names[1:], start=1)
+        if not any(is_imported(files[index], by=before) for before in files[:index])
+    ]
+    assert unmet == by_disk
+    for name in by_disk:
+        index = names.index(name)
+        assert any(is_imported(before, by=files[index]) for before in files[:index])
+    public = [name for file in files for name in public_names(file)]
+    assert sorted(name for name in set(public) if public.count(name) > 1) == []
+
+
+def is_imported(file: Path, *, by: Path) -> bool:
+    """Whether a file imports another one, or a name of its room that has the other one's name."""
+    module = "charnerf." + ".".join(file.relative_to(PACKAGE).with_suffix("").parts)
+    tree = ast.parse(by.read_text(encoding="utf-8"))
+    froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    return any(
+        module in (node.module, f"{node.module}.{alias.name}") for node in froms for alias in node.names
+    )
+
+
+def public_names(file: Path) -> list[str]:
+    """Functions and classes of a file that others may use."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    return [
+        node.name
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+    ]
 
 
 def test_no_drawer_for_leftovers() -> None:
