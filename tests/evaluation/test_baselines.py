@@ -91,7 +91,7 @@ def test_contradicting_drawings_have_no_hull_and_draw_white():
     assert empty.mesh is None
     assert bool((empty.render(target_cameras(1)[0]).opacity == 0.0).all())
     scores, reasons = surface_scores(None, figure("ball").vertices, target_cameras(1))
-    assert scores == {"chamfer_mm": None, "f_score": None}
+    assert scores == {"chamfer_mm": None, "f_score": None, "parts_lost": None}
     assert reasons["chamfer_mm"] == "no surface was found"
 
 

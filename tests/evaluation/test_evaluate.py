@@ -85,7 +85,7 @@ def test_every_view_is_a_row_and_the_rows_mean_is_the_metric(outcome, figure_dat
     assert {row["view"] for row in doll} == {
         path.stem for path in (output / "images" / "doll").glob("0*.png")
     }
-    assert all(row["lpips"] == "" for row in rows)
+    assert all(row["lpips_vgg"] == "" for row in rows)
 
 
 def test_kept_predictions_give_the_same_metric_again(outcome, figure_dataset):

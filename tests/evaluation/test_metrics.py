@@ -1,14 +1,17 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from charnerf.errors import DataError, NumericalError, ShapeError
 from charnerf.evaluation import metrics
 from charnerf.evaluation.lpips import Lpips
 
+EXAMPLES = Path(__file__).parent / "lpips"
 PICTURE_METRICS = (metrics.psnr, metrics.ssim, metrics.flip, Lpips())
 
 
@@ -57,6 +60,17 @@ def test_foreground_counts_only_pixels_of_alpha_above_a_half():
     assert metrics.psnr_foreground(prediction, truth, torch.zeros(2, 2)) is None
 
 
+def test_union_counts_what_is_missing_and_what_is_too_much():
+    """Of four pixels one is right, one missing, one too much, one empty in both: two of three shown are wrong by 1."""
+    truth, prediction = torch.ones(2, 2, 3), torch.ones(2, 2, 3)
+    alpha, opacity = torch.tensor([[1.0, 1.0], [0.0, 0.5]]), torch.tensor([[1.0, 0.0], [1.0, 0.5]])
+    truth[0] = prediction[0, 0] = prediction[1, 0] = 0.0
+    found = metrics.psnr_union(prediction, truth, opacity, alpha)
+    assert found == pytest.approx(-10.0 * math.log10(2.0 / 3.0))
+    assert metrics.psnr_foreground(prediction, truth, alpha) == pytest.approx(-10.0 * math.log10(0.5))
+    assert metrics.psnr_union(prediction, truth, torch.zeros(2, 2), torch.zeros(2, 2)) is None
+
+
 def test_white_has_a_closed_form():
     """White against a black square that fills a quarter: MSE 1/4, foreground MSE 1."""
     truth, alpha = torch.ones(16, 16, 3), torch.zeros(16, 16)
@@ -81,11 +95,30 @@ def test_flip_is_zero_for_equal_pictures_and_grows_with_the_error(pair):
     assert 0.0 < small < large < 1.0
 
 
-def test_lpips_is_a_number_or_null_with_a_reason(pair):
+def test_lpips_is_as_its_authors_document():
+    """Their three pictures and two distances; zero to itself, and the same either way round."""
+
+    def picture(name: str) -> torch.Tensor:
+        return torch.from_numpy(np.array(Image.open(EXAMPLES / name).convert("RGB")) / 255.0).float()
+
+    lpips, reference = Lpips(), picture("ex_ref.png")
+    for name, expected in (("ex_p0.png", 0.7219), ("ex_p1.png", 0.1376)):
+        found = lpips(picture(name), reference)["lpips"]
+        assert found == pytest.approx(expected, abs=5e-4)
+        assert lpips(reference, picture(name))["lpips"] == pytest.approx(found, rel=1e-5)
+    assert lpips(reference, reference)["lpips"] == 0.0
+
+
+def test_pictures_too_small_for_lpips_have_none():
+    assert Lpips()(torch.zeros(30, 40, 3), torch.ones(30, 40, 3))["lpips"] is None
+    assert Lpips()(torch.zeros(31, 31, 3), torch.ones(31, 31, 3))["lpips"] is not None
+
+
+def test_lpips_by_vgg_is_a_number_or_null_with_a_reason(pair):
     lpips = Lpips()
-    value, reason = lpips(*pair), lpips.reason
+    value, reason = lpips(*pair)["lpips_vgg"], lpips.vgg_reason
     assert (value is None) != (reason is None)
-    assert reason is None or "LPIPS needs" in reason
+    assert reason is None or "LPIPS with VGG needs" in reason
 
 
 @pytest.mark.parametrize("metric", PICTURE_METRICS)
@@ -129,6 +162,16 @@ def test_chamfer_and_f_score_by_hand():
     predicted = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     assert metrics.chamfer_mm(*metrics.surface_distances(predicted, true)) == pytest.approx(250.0)
     assert metrics.f_score(*metrics.surface_distances(predicted, true)) == pytest.approx(2.0 / 3.0)
+
+
+def test_parts_lost_is_the_share_of_the_truth_that_is_far_from_ours():
+    """A hand of a tenth of the points, a metre away; what ours has too much loses nothing."""
+    body, hand = np.zeros((9, 3)), np.full((1, 3), 1.0)
+    _, back = metrics.surface_distances(body, np.concatenate((body, hand)))
+    assert metrics.parts_lost(back) == pytest.approx(0.1)
+    _, back = metrics.surface_distances(np.concatenate((body, hand)), body)
+    assert metrics.parts_lost(back) == 0.0
+    assert metrics.parts_lost(np.array([0.049, 0.051])) == 0.5
 
 
 def test_points_that_are_none_or_not_finite_are_refused():

@@ -74,8 +74,8 @@ def test_evaluating_the_run_gives_its_own_figures(run_folder, figure_dataset, tm
     assert charnerf([*command, "--nearest-from", str(figure_dataset), "--device", "cpu"]) == 0
     own, again = (json.loads(path.read_text()) for path in (run_folder / "metrics.json", file))
     assert again["num_views"] == own["num_views"] == 1
-    measured = [key for key in METRIC_KEYS if own[key] is not None]  # LPIPS needs weights
-    assert {*METRIC_KEYS} - {*measured} <= {"lpips"}
+    measured = [key for key in METRIC_KEYS if own[key] is not None]  # VGG needs weights
+    assert {*METRIC_KEYS} - {*measured} <= {"lpips_vgg"}
     assert [again[key] for key in measured] == pytest.approx([own[key] for key in measured], rel=1e-5)
     assert again["baselines"]["nearest"]["found"] == own["baselines"]["nearest"]["found"]
     assert again["seconds"]["train"] == own["seconds"]["train"]

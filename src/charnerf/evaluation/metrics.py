@@ -19,6 +19,8 @@ FOREGROUND_ALPHA = 0.5
 """True alpha above which a pixel counts as the character."""
 F_SCORE_RADIUS_M = 0.02
 """Distance within which a surface point counts as found."""
+LOST_RADIUS_M = 0.05
+"""Distance beyond which a point of the true surface counts as lost: a hand, a foot, an ear."""
 HAZE = (0.05, 0.95)
 """Opacities between which a pixel is neither clear nor opaque."""
 HAZE_MARGIN = 2.0
@@ -90,6 +92,26 @@ def psnr_foreground(prediction: Tensor, truth: Tensor, true_alpha: Tensor) -> fl
     if not bool(inside.any()):
         return None
     return _decibels((prediction[inside].double() - truth[inside].double()).square())
+
+
+def psnr_union(prediction: Tensor, truth: Tensor, opacity: Tensor, true_alpha: Tensor) -> float | None:
+    """Peak signal-to-noise ratio over pixels that either shows, opacity or true alpha (H, W) above 0.5; None where there is none.
+
+    What is missing and what is too much count alike: `psnr_foreground` does not see the latter, which flatters fat figures.
+
+    Raises:
+        DataError: If values leave [0, 1].
+        NumericalError: If values are not finite.
+        ShapeError: If the shapes differ.
+    """
+    check_pair(prediction, truth)
+    for name, values in (("opacity", opacity), ("true_alpha", true_alpha)):
+        check_unit_range(name, values)
+        check_same_shape(name, values, "truth[..., 0]", truth[..., 0])
+    shown = (opacity > FOREGROUND_ALPHA) | (true_alpha > FOREGROUND_ALPHA)
+    if not bool(shown.any()):
+        return None
+    return _decibels((prediction[shown].double() - truth[shown].double()).square())
 
 
 def ssim(prediction: Tensor, truth: Tensor) -> float:
@@ -172,6 +194,11 @@ def f_score(there: np.ndarray, back: np.ndarray, *, radius: float = F_SCORE_RADI
     precision, recall = float((there <= radius).mean()), float((back <= radius).mean())
     total = precision + recall
     return 2.0 * precision * recall / total if total else 0.0
+
+
+def parts_lost(back: np.ndarray, *, radius: float = LOST_RADIUS_M) -> float:
+    """Share of the true surface that lies farther than a radius, m, from ours, by the distances (M,) of `surface_distances`."""
+    return float((back > radius).mean())
 
 
 def haze(opacity: Tensor) -> float | None:

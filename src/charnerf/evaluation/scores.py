@@ -10,12 +10,22 @@ from torch import Tensor
 from charnerf.checks import check_finite
 from charnerf.evaluation import metrics
 from charnerf.evaluation.angles import Record, mean_of, mean_over_characters
-from charnerf.evaluation.lpips import Lpips
+from charnerf.evaluation.lpips import LEAST_SIDE, Lpips
 from charnerf.evaluation.surface_error import SURFACE_KEYS
 from charnerf.pictures import on_white
 from charnerf.types import RenderOutput
 
-VIEW_KEYS = ("psnr", "psnr_foreground", "ssim", "lpips", "flip", "silhouette_iou", "haze")
+VIEW_KEYS = (
+    "psnr",
+    "psnr_foreground",
+    "psnr_union",
+    "ssim",
+    "lpips",
+    "lpips_vgg",
+    "flip",
+    "silhouette_iou",
+    "haze",
+)
 METRIC_KEYS = VIEW_KEYS + SURFACE_KEYS
 
 
@@ -57,8 +67,10 @@ def score_views(
     """VIEW_KEYS of predictions against the true bytes (n, H, W, 4), and why a key is missing."""
     scores = [_score_view(*pair, lpips) for pair in zip(predictions, images, strict=True)]
     reasons = {
-        "lpips": lpips.reason,
+        "lpips": f"the pictures have fewer than {LEAST_SIDE} pixels a side",
+        "lpips_vgg": lpips.vgg_reason or f"the pictures have fewer than {LEAST_SIDE} pixels a side",
         "psnr_foreground": "no pixel has a true alpha above 0.5",
+        "psnr_union": "neither picture shows anything",
         "haze": "the picture is empty",
     }
     missing = {key for each in scores for key, value in each.items() if value is None}
@@ -71,8 +83,9 @@ def _score_view(prediction: RenderOutput, image: Tensor, lpips: Lpips) -> dict[s
     return {
         "psnr": metrics.psnr(prediction.rgb, truth),
         "psnr_foreground": metrics.psnr_foreground(prediction.rgb, truth, alpha),
+        "psnr_union": metrics.psnr_union(prediction.rgb, truth, prediction.opacity, alpha),
         "ssim": metrics.ssim(prediction.rgb, truth),
-        "lpips": lpips(prediction.rgb, truth),
+        **lpips(prediction.rgb, truth),
         "flip": metrics.flip(prediction.rgb, truth),
         "silhouette_iou": metrics.silhouette_iou(prediction.opacity, alpha),
         "haze": metrics.haze(prediction.opacity),

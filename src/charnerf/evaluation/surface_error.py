@@ -9,14 +9,14 @@ import trimesh
 from charnerf.data.surface import AreaSurface, visible_surface_points
 from charnerf.data.visibility import see_points
 from charnerf.errors import DataError
-from charnerf.evaluation.metrics import chamfer_mm, f_score, surface_distances
+from charnerf.evaluation.metrics import chamfer_mm, f_score, parts_lost, surface_distances
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import interpolate
 from charnerf.types import Cameras
 
 NUM_POINTS = 50_000
 """Points a surface: their spacing alone puts equal surfaces of 2 square metres about 3 mm apart."""
-SURFACE_KEYS = ("chamfer_mm", "f_score")
+SURFACE_KEYS = ("chamfer_mm", "f_score", "parts_lost")
 
 
 def true_points(mesh_file: Path, *, seed: int = 0) -> np.ndarray:
@@ -69,7 +69,11 @@ def surface_scores(
     except DataError as error:
         return missing_surface(str(error))
     distances = surface_distances(points, truth)
-    return {"chamfer_mm": chamfer_mm(*distances), "f_score": f_score(*distances)}, {}
+    return {
+        "chamfer_mm": chamfer_mm(*distances),
+        "f_score": f_score(*distances),
+        "parts_lost": parts_lost(distances[1]),
+    }, {}
 
 
 def missing_surface(reason: str) -> tuple[dict[str, float | None], dict[str, str]]:

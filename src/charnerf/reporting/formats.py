@@ -6,6 +6,7 @@ from typing import Any
 COLUMNS = {
     "psnr": ("PSNR ↑ dB", "{:.2f}"),
     "psnr_foreground": ("foreground ↑ dB", "{:.2f}"),
+    "psnr_union": ("union ↑ dB", "{:.2f}"),
     "ssim": ("SSIM ↑", "{:.3f}"),
     "lpips": ("LPIPS ↓", "{:.3f}"),
     "flip": ("FLIP ↓", "{:.3f}"),
