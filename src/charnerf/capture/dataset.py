@@ -69,10 +69,8 @@ def capture_dataset(
         up: Axis that points up in all files; None for each format's own.
         facing: Signed axis that the characters face; None for each format's own.
         variants: Of each mesh, captured instead of it (capture/variants.py): NAME+1, NAME+2, ...
-        swaps: Characters with each mesh's body and other meshes' heads and legs, instead of it (capture/part_swaps.py):
-            NAME+s1, NAME+s2, ...
-        drawn: Copies of each mesh whose source views are drawings, seven of ten of them variants, instead of it: NAME+d1,
-            NAME+d2, ...
+        swaps: Of each mesh's body with other meshes' heads and legs, instead of it (capture/part_swaps.py): NAME+s1, ...
+        drawn: Copies of each mesh, seven of ten varied, whose source views are drawings, instead of it: NAME+d1, ...
         draw: Makes their drawings.
         seed: What variants, swaps and drawings are drawn from; the same seed gives the same ones, however many.
         processes: Worker processes; None for one a core.
@@ -87,21 +85,12 @@ def capture_dataset(
     options = options or CaptureOptions()
     files, root = expand_mesh_paths(mesh_paths), Path(root)
     check_name("split", split)
-    for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
-        axes_rotation(*file_axes(suffix, up, facing))
+    _check_axes(files, up, facing)
     items = _items(files, variants, swaps, drawn)
-    refuse_taken_names(open_or_new(root), [item.name for item in items])
-    root.mkdir(parents=True, exist_ok=True)
-    remove_partial_characters(root)
+    _make_room(root, items)
+    donors = sorted(files)
     work = partial(
-        _capture_item,
-        root=root,
-        options=options,
-        donors=sorted(files),
-        draw=draw,
-        up=up,
-        facing=facing,
-        seed=seed,
+        _capture_item, root=root, options=options, donors=donors, draw=draw, up=up, facing=facing, seed=seed
     )
     add = partial(add_to_split, root, split, made_by=made_by(options))
     return _capture_items(items, work, add, root=root, processes=processes)
@@ -193,6 +182,18 @@ def _items(files: Sequence[Path], variants: int, swaps: int, drawn: int) -> list
         for kind, count in (("", variants), ("s", swaps), ("d", drawn)):
             items += [_Item(file, number, kind) for number in range(1, count + 1)]
     return items or [_Item(file) for file in files]
+
+
+def _check_axes(files: Sequence[Path], up: str | None, facing: str | None) -> None:
+    for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
+        axes_rotation(*file_axes(suffix, up, facing))
+
+
+def _make_room(root: Path, items: Sequence[_Item]) -> None:
+    """Make the data set's folder; names that are taken are refused, what killed captures left goes."""
+    refuse_taken_names(open_or_new(root), [item.name for item in items])
+    root.mkdir(parents=True, exist_ok=True)
+    remove_partial_characters(root)
 
 
 def _capture_items(

@@ -133,8 +133,10 @@ def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None)
 
 def _number_of_views(text: str | None) -> int | Literal["all"] | None:
     """Fixed views a character of a number or `all`; None where nothing is said."""
-    if text is None or text == "all":
-        return text
+    if text is None:
+        return None
+    if text == "all":
+        return "all"
     if not (text.isdigit() and int(text) >= 1):
         raise ConfigError(f"--views: found '{text}', expected a number from 1 on, or all.")
     return int(text)
