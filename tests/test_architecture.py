@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "charnerf"
 FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 400
+MAX_FUNCTION_LINES = 50
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
     ("errors",),
@@ -190,6 +191,16 @@ def test_no_drawer_for_leftovers() -> None:
 def test_files_stay_short(file: Path) -> None:
     count = len(file.read_text(encoding="utf-8").splitlines())
     assert count <= MAX_LINES, f"{file}: {count} lines, expected at most {MAX_LINES}; split it by idea"
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_functions_stay_short(file: Path) -> None:
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            count = (node.end_lineno or 0) - node.lineno + 1
+            assert count <= MAX_FUNCTION_LINES, (
+                f"{file}:{node.lineno}: {node.name} has {count} lines, expected at most {MAX_FUNCTION_LINES}; name a step of it"
+            )
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
