@@ -175,7 +175,7 @@ def test_foreign_targets_are_refused_wherever_they_hide() -> None:
     assert message.startswith("trainer.profiler._target_: found 'os.system'")
     message = problem("+trainer.plugins=[{_target_: os.system, command: x}]")
     assert message.startswith(
-        "trainer.plugins.0._target_: found 'os.system', expected a class of charnerf or "
+        "trainer.plugins.0._target_: found 'os.system', expected one of lightning.pytorch.plugins."
     )
     assert "trusted_targets=[os] on the command line" in message
 

@@ -12,12 +12,13 @@ from charnerf.cli.drawings import AsDrawn
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Dataset, Device, Trusted, Weights
-from charnerf.errors import ConfigError
+from charnerf.errors import ConfigError, DataError
 from charnerf.meshing.options import MeshOptions
 
 if TYPE_CHECKING:
     from charnerf.data.characters import Character
 
+MOST_VIEWS = 100_000
 FIXED_VIEWS = 24  # a character, by weights that lie in no run's folder
 NumViews = Annotated[
     str | None,
@@ -137,8 +138,8 @@ def _number_of_views(text: str | None) -> int | Literal["all"] | None:
         return None
     if text == "all":
         return "all"
-    if not (text.isdigit() and int(text) >= 1):
-        raise ConfigError(f"--views: found '{text}', expected a number from 1 on, or all.")
+    if not (text.isdecimal() and text.isascii() and len(text) <= 6 and 1 <= int(text) <= MOST_VIEWS):
+        raise ConfigError(f"--views: found '{text[:60]}', expected a number from 1 to {MOST_VIEWS}, or all.")
     return int(text)
 
 
@@ -156,13 +157,21 @@ def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:
     """Fixed views a character and grid points of its mesh that a run measured at its end."""
     from omegaconf import OmegaConf
 
+    from charnerf.config.bounds import largest
+    from charnerf.config.hints import shown
     from charnerf.inference.weights import load_config
 
     if run is None:
         return FIXED_VIEWS, MeshOptions.resolution
-    cfg = load_config(run)
-    views: int | None = OmegaConf.select(cfg, "scale.eval_views", default=FIXED_VIEWS)
-    resolution: int = OmegaConf.select(cfg, "scale.mesh_resolution", default=MeshOptions.resolution)
+    cfg = load_config(run, ["scale"])
+    views = OmegaConf.select(cfg, "scale.eval_views", default=FIXED_VIEWS)
+    resolution = OmegaConf.select(cfg, "scale.mesh_resolution", default=MeshOptions.resolution)
+    numbers = {"eval_views": 1 if views is None else views, "mesh_resolution": resolution}
+    for name, value in numbers.items():
+        if type(value) is not int or not 1 <= value <= largest(name):
+            raise DataError(
+                f"{run / 'config.yaml'}: scale.{name}: found {shown(value)}, expected 1 to {largest(name)}."
+            )
     return "all" if views is None else views, resolution
 
 

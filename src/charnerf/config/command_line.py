@@ -8,7 +8,9 @@ from pathlib import Path
 
 from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
+from charnerf.config.bounds import MOST_BYTES, check_yaml
 from charnerf.config.composition import compose_unchecked
 from charnerf.config.hydra_internals import looks_only, read_arguments
 from charnerf.config.overrides import config_files, jobs_of, trusted_by
@@ -29,6 +31,8 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
         return
     name = (args.config_name or "train").removesuffix(".yaml")
     folder = Path(args.config_path).resolve() if args.config_path else conf
+    for own in (one for one in (args.config_path, args.config_dir) if one):
+        check_config_files(Path(own))
     more = [f"hydra.searchpath=[{Path(args.config_dir).resolve().as_uri()}]"] if args.config_dir else []
     broken: list[tuple[list[str], ConfigError]] = []
     with config_files(folder):
@@ -49,6 +53,22 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
     raise ConfigError(
         f"{len(broken)} of {len(jobs)} jobs can not start, so none was; first `{' '.join(first)}`:\n{problem}"
     ) from problem
+
+
+def check_config_files(folder: Path) -> None:
+    """Check that config files are small when their anchors are expanded, before Hydra expands them.
+
+    Raises:
+        ConfigError: If one is not, or is no YAML.
+    """
+    for file in sorted(folder.rglob("*.yaml")):
+        try:
+            with file.open("rb") as opened:
+                check_yaml(opened.read(MOST_BYTES + 1), str(file))
+        except YAMLError as error:
+            raise ConfigError(
+                f"{file}: can not be read ({' '.join(str(error).split())[:200]}), expected YAML."
+            ) from error
 
 
 def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: Path) -> int:

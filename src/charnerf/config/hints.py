@@ -13,15 +13,16 @@ SCHEMAS = "charnerf.config.schema"  # its dataclasses are plain sections; all ot
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """What a section with `_target_` may name.
+    """A place that holds a part.
 
     Attributes:
-        homes: Modules, one of which the class lives in or below.
+        group: Of the registry, whose classes may stand here; "" for any part of charnerf, in an argument of a class that the
+            user trusts.
         given: Arguments that the code that builds the part passes itself; the config neither needs nor may
             set them.
     """
 
-    homes: tuple[str, ...]
+    group: str
     given: frozenset[str] = frozenset()
 
 
@@ -80,6 +81,19 @@ def alternatives(hint: Any) -> tuple[Any, ...]:
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 
+def holds_parts(hint: Any) -> bool:
+    """Whether an object may stand where a hint stands: not where a number, a text or a collection does."""
+    return not all(_is_plain(one) for one in alternatives(hint))
+
+
+def _is_plain(hint: Any) -> bool:
+    kind = get_origin(hint) or hint
+    if kind is object or kind is Callable:
+        return False
+    modules = ("builtins", "pathlib", "collections.abc")
+    return kind is Literal or isinstance(hint, str) or (inspect.isclass(kind) and kind.__module__ in modules)
+
+
 def fits(hint: Any, value: Any) -> bool:  # noqa: PLR0911 (one line a kind)
     """Whether a plain value may stand where a hint stands; what YAML can not express must be a part."""
     origin = get_origin(hint)
@@ -97,7 +111,7 @@ def fits(hint: Any, value: Any) -> bool:  # noqa: PLR0911 (one line a kind)
     if not inspect.isclass(kind):
         return True
     if isinstance(value, Mapping):
-        return "_target_" in value or issubclass(dict, kind)
+        return issubclass(dict, kind)
     if isinstance(value, list):
         return kind is tuple or (issubclass(list, kind) and kind is not str)
     if isinstance(value, str):
@@ -113,7 +127,7 @@ def describe(hint: Any) -> str:  # noqa: PLR0911 (one line a kind)
     if origin is Annotated:
         inner, *notes = get_args(hint)
         part = next((note for note in notes if isinstance(note, Part)), None)
-        return f"a section with _target_, a class of {' or '.join(part.homes)}" if part else describe(inner)
+        return f"a section with _target_, a class of {part.group}" if part else describe(inner)
     if hint is type(None) or hint is None:
         return "null"
     if origin in (Union, types.UnionType):
@@ -136,5 +150,14 @@ def shown(value: Any) -> str:
     """A value as a message shows it, shortened."""
     if value is None:
         return "null"
-    text = repr(value)
+    text = shown_number(value) if isinstance(value, int) else repr(value)
     return f"{text if len(text) <= 60 else text[:57] + '...'} ({type(value).__name__})"
+
+
+def shown_number(value: float) -> str:
+    """A number as a message shows it: whole where it is whole, and its size alone where it has very many digits."""
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        value = int(value)
+    if isinstance(value, int) and abs(value) >= 10**60:
+        return f"a whole number of {value.bit_length()} bits"
+    return str(value)

@@ -7,9 +7,10 @@ from pathlib import Path
 from hydra import initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep
 from hydra.errors import HydraException
 
+from charnerf.config.bounds import DEEPEST, LONGEST, MOST_JOBS
 from charnerf.config.hydra_internals import split_sweep
 from charnerf.errors import ConfigError
 
@@ -37,6 +38,7 @@ def parse_overrides(overrides: Sequence[str]) -> list[Override]:
     parser = OverridesParser.create(config_loader=loader)  # type: ignore[arg-type]
     parsed: list[Override] = []
     for one in overrides:
+        _check_length(one)
         try:
             parsed += parser.parse_overrides([one])
         except HydraException as error:
@@ -49,12 +51,43 @@ def jobs_of(overrides: Sequence[str]) -> list[list[str]]:
     """The overrides of every job of a sweep.
 
     Raises:
-        ConfigError: If they can not be read, or a glob has no options.
+        ConfigError: If they can not be read, a glob has no options, or they are more jobs than a sweep may have.
     """
     try:
-        return split_sweep(parse_overrides(overrides))
+        parsed = parse_overrides(overrides)
+        _check_jobs(parsed)
+        return split_sweep(parsed)
     except HydraException as error:
         raise ConfigError(f"{' '.join(overrides)}: {error}") from error
+
+
+def _check_length(override: str) -> None:
+    """Refuse an override that would take the parser minutes, or all of its stack."""
+    depth = deepest = 0
+    for sign in override[: LONGEST + 1]:
+        depth += (sign in "[{(") - (sign in ")}]")
+        deepest = max(deepest, depth)
+    if len(override) > LONGEST or deepest > DEEPEST:
+        key = override.partition("=")[0][:60]
+        raise ConfigError(
+            f"{key}: found {len(override)} characters and {deepest} brackets within each other, expected at most {LONGEST}"
+            f" and {DEEPEST}."
+        )
+
+
+def _check_jobs(overrides: Sequence[Override]) -> None:
+    """Refuse a sweep of more jobs than anybody means."""
+    jobs = 1.0
+    for one in overrides:
+        value = one.value()
+        if isinstance(value, ChoiceSweep):
+            jobs *= max(1, len(value.list))
+        elif isinstance(value, RangeSweep):
+            jobs *= max(1.0, abs((value.stop or 0) - (value.start or 0)) / (abs(value.step) or 1e-9))
+        if jobs > MOST_JOBS:
+            raise ConfigError(
+                f"{one.key_or_group}: with it the sweep has more than {MOST_JOBS} jobs, expected fewer."
+            )
 
 
 def trusted_by(overrides: Sequence[str]) -> list[str]:

@@ -16,6 +16,11 @@ class Problems:
         if (key, message) not in self.entries:
             self.entries.append((key, message))
 
+    def add_once(self, key: str, message: str) -> None:
+        """Note a problem at a full key that has none yet."""
+        if not any(one == key for one, _ in self.entries):
+            self.entries.append((key, message))
+
     def touch(self, key: str) -> bool:
         """Whether a key, a part of it or a section around it has a problem."""
         return any(_is_within(one, key) or _is_within(key, one) for one, _ in self.entries)

@@ -11,8 +11,8 @@ CountOrZero = Annotated[int, AtLeast(0)]
 Share = Annotated[float, AtLeast(0), AtMost(1)]
 
 
-def _part(*homes: str, given: Sequence[str] = ()) -> Any:
-    return Annotated[Any, Part(homes=homes, given=frozenset(given))]
+def _part(group: str, given: Sequence[str] = ()) -> Any:
+    return Annotated[Any, Part(group=group, given=frozenset(given))]
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class ModelSettings:
     num_frequencies: Count
     box_centre: list[float]
     box_half_extent: Annotated[float, Above(0)]
-    activation: _part("charnerf.models.activations")  # type: ignore[valid-type]
+    activation: _part("activation")  # type: ignore[valid-type]
 
 
 F1_GIVEN = ("width", "num_frequencies", "num_point_features", "num_blocks")
@@ -133,28 +133,28 @@ class RunConfig:
     model: ModelSettings
     scale: Scale
     budget: Budget
-    encoder: _part("charnerf.models.encoders", given=["in_channels"])  # type: ignore[valid-type]
-    single_view: _part("charnerf.models.single_view", given=F1_GIVEN)  # type: ignore[valid-type]
-    combinator: _part("charnerf.models.combinators", given=["width"])  # type: ignore[valid-type]
-    head: _part("charnerf.models.heads", given=["width"])  # type: ignore[valid-type]
-    density: _part("charnerf.models.density", given=["width"])  # type: ignore[valid-type]
-    views: _part("charnerf.models.views")  # type: ignore[valid-type]
-    features: _part("charnerf.models.features")  # type: ignore[valid-type]
-    quadrature: _part("charnerf.volume.quadrature")  # type: ignore[valid-type]
-    renderer: _part("charnerf.volume.renderers", given=["quadrature"])  # type: ignore[valid-type]
+    encoder: _part("encoder", given=["in_channels"])  # type: ignore[valid-type]
+    single_view: _part("single_view", given=F1_GIVEN)  # type: ignore[valid-type]
+    combinator: _part("combinator", given=["width"])  # type: ignore[valid-type]
+    head: _part("head", given=["width"])  # type: ignore[valid-type]
+    density: _part("density", given=["width"])  # type: ignore[valid-type]
+    views: _part("views")  # type: ignore[valid-type]
+    features: _part("features")  # type: ignore[valid-type]
+    quadrature: _part("quadrature")  # type: ignore[valid-type]
+    renderer: _part("renderer", given=["quadrature"])  # type: ignore[valid-type]
     splits: Splits
     batches: Batches
     validation: Validation
     optimization: Optimization
     averaging: Averaging
-    surface_dirs: _part("charnerf.losses")  # type: ignore[valid-type]
-    surface: _part("charnerf.data.surface", given=["mesh"])  # type: ignore[valid-type]
-    augmentation: dict[str, _part("charnerf.data.augmentation", given=["used_views"])]  # type: ignore[valid-type]
-    loss: dict[str, _part("charnerf.losses")]  # type: ignore[valid-type]
-    schedule: _part("charnerf.schedule")  # type: ignore[valid-type]
-    data: _part("charnerf.data", "charnerf.capture")  # type: ignore[valid-type]
-    optimizer: _part("torch.optim", "charnerf.training", given=["params"])  # type: ignore[valid-type]
-    trainer: _part("lightning", given=TRAINER_GIVEN)  # type: ignore[valid-type]
+    surface_dirs: _part("surface_dirs")  # type: ignore[valid-type]
+    surface: _part("surface", given=["mesh"])  # type: ignore[valid-type]
+    augmentation: dict[str, _part("augmentation", given=["used_views"])]  # type: ignore[valid-type]
+    loss: dict[str, _part("loss")]  # type: ignore[valid-type]
+    schedule: _part("schedule")  # type: ignore[valid-type]
+    data: _part("data")  # type: ignore[valid-type]
+    optimizer: _part("optimizer", given=["params"])  # type: ignore[valid-type]
+    trainer: _part("trainer", given=TRAINER_GIVEN)  # type: ignore[valid-type]
 
 
 LIST_GROUPS = ("augmentation",)  # any number of options, in order, each a part of its own

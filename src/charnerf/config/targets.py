@@ -1,41 +1,59 @@
-"""Which classes a `_target_` may name, and finding them."""
+"""Finding the class that a `_target_` names, where the registry or the user lets it be named."""
 
 import importlib
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from charnerf.config.hints import nearest, shown
 from charnerf.config.problems import Problems
+from charnerf.config.registry import GROUPS
 
-ALLOWED_TARGETS = ("charnerf.", "torch.optim.", "lightning.")
+OURS = tuple(name for names in GROUPS.values() for name in names if name.startswith("charnerf."))
 
 
-def resolve(name: Any, homes: Sequence[str], key: str, problems: Problems) -> Callable[..., Any] | None:
-    """Find the class that `_target_` names, if it may be named.
+def resolve(name: Any, group: str, key: str, problems: Problems) -> type | None:
+    """Find the class that `_target_` names; nothing is imported that may not stand here.
 
-    The module of what is found counts too: an alias such as `charnerf.x.os.system` passes any check of names.
+    Args:
+        name: As written.
+        group: Of the registry; "" for any part of charnerf, in an argument of a class that the user trusts.
+        key: Full key of the `_target_`.
+        problems: Takes what is wrong; its trusted modules may be named in any group.
+
+    Returns:
+        The class, None where there is none or it may not stand here.
     """
-    trusted = tuple(f"{one.rstrip('.')}." for one in problems.trusted)
-    wanted = tuple(f"{home}." for home in homes) or ALLOWED_TARGETS
-    root = str(name).split(".")[0]
-    advice = f"; your own classes need trusted_targets=[{root}] on the command line."
-    expected = f"expected a class of {' or '.join(one.rstrip('.') for one in wanted)}"
+    choices = GROUPS[group] if group else OURS
+    expected = f"expected one of {', '.join(choices)}" if group else "expected a part of charnerf"
     if not isinstance(name, str) or not all(piece.isidentifier() for piece in name.split(".")):
         problems.add(key, f"found {shown(name)}, {expected}.")
         return None
-    if not name.startswith(wanted + trusted):
-        inside = name.startswith(ALLOWED_TARGETS)
-        problems.add(key, f"found '{name}', {expected}{'.' if inside else advice}")
+    trusted = tuple(f"{one.rstrip('.')}." for one in problems.trusted)
+    if name not in choices and not name.startswith(trusted):
+        if _is_misspelt(name, choices):
+            locate(name, key, problems)
+        root = name.split(".")[0]
+        is_foreign = root not in ("charnerf", "lightning", "torch")
+        advice = f"; your own classes need trusted_targets=[{root}] on the command line" if is_foreign else ""
+        problems.add_once(key, f"found '{name}', {expected}{advice}.")
         return None
     target = locate(name, key, problems)
     if target is None:
         return None
-    module = f"{getattr(target, '__module__', '')}."
-    if not callable(target) or not module.startswith(ALLOWED_TARGETS + trusted):
+    home = f"{getattr(target, '__module__', '')}."  # an alias such as `mylab.x.os.system` passes any check of names
+    if not inspect.isclass(target) or not (name in choices or home.startswith(trusted)):
         problems.add(key, f"found '{name}', which is {shown_object(target)}; {expected}.")
         return None
     return target
+
+
+def _is_misspelt(name: str, choices: Sequence[str]) -> bool:
+    """Whether a name is of a module of the choices, none of whose names it is."""
+    module, _, last = name.rpartition(".")
+    if module not in {choice.rpartition(".")[0] for choice in choices}:
+        return False
+    return not hasattr(importlib.import_module(module), last)
 
 
 def locate(name: str, key: str, problems: Problems) -> Any:

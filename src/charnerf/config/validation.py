@@ -12,7 +12,9 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from charnerf.config.bounds import check_values
 from charnerf.config.checks import BROKEN, MISSING, check_section
+from charnerf.config.hints import shown
 from charnerf.config.problems import Problems, join
 from charnerf.config.rules import RULES, idle_settings
 from charnerf.config.schema import MODEL_SECTIONS, RunConfig
@@ -55,13 +57,7 @@ def validate_model(cfg: DictConfig, *, trusted_targets: Sequence[str] = ()) -> N
     """Check, as `validate` does, what the model needs of a config that came with weights."""
     hints = get_type_hints(RunConfig, include_extras=True)
     schema = make_dataclass("ModelConfig", [(name, hints[name]) for name in MODEL_SECTIONS], frozen=True)
-    whole = cfg.copy()
-    try:
-        OmegaConf.resolve(whole)  # what sections take from others, before those are left out
-    except OmegaConfBaseException:
-        whole = cfg  # reported below, by key
-    chosen = OmegaConf.masked_copy(whole, [name for name in MODEL_SECTIONS if name in whole])
-    _validate_against(schema, chosen, trusted_targets)
+    _validate_against(schema, cfg, trusted_targets, sections=MODEL_SECTIONS)
 
 
 def check_files(cfg: DictConfig) -> None:
@@ -97,10 +93,19 @@ def warn_of_idle_settings(cfg: DictConfig) -> None:
         warnings.warn(message, stacklevel=2)
 
 
-def _validate_against(schema: type, cfg: DictConfig, trusted_targets: Sequence[str]) -> None:
+def _validate_against(
+    schema: type, cfg: DictConfig, trusted_targets: Sequence[str], sections: Sequence[str] | None = None
+) -> None:
+    """Check the sections of a config, all if None; the others are neither read nor resolved."""
+    check_values(OmegaConf.to_container(cfg, resolve=False))
     problems = Problems(trusted=tuple(trusted_targets))
-    plain = to_plain(cfg, "", problems)
+    plain = to_plain(cfg, "", problems, names=sections)
     check_section(schema, plain, "", problems)
+    if not {str(one) for one in plain.get("trusted_targets") or ()} <= set(trusted_targets):
+        problems.add(
+            "trusted_targets",
+            f"found {shown(plain['trusted_targets'])} in a file, expected it on the command line.",
+        )
     for keys, rule in RULES:
         values = [look_up(plain, key) for key in keys]
         if not any(value is BROKEN or problems.touch(key) for key, value in zip(keys, values, strict=True)):
@@ -117,10 +122,10 @@ def as_message(lines: Sequence[str]) -> str:
     return "\n".join([f"The config has {len(lines)} problems:", *(f"  {line}" for line in lines)])
 
 
-def to_plain(node: Any, key: str, problems: Problems) -> Any:
-    """Resolve a config into dicts, lists and values; what can not be read becomes a problem."""
+def to_plain(node: Any, key: str, problems: Problems, *, names: Sequence[Any] | None = None) -> Any:
+    """Resolve a config, or some of its sections, into dicts, lists and values; what can not be read becomes a problem."""
     if isinstance(node, DictConfig):
-        names: Sequence[Any] = list(node.keys())
+        names = list(node.keys()) if names is None else [name for name in names if name in node]
     elif isinstance(node, ListConfig):
         names = range(len(node))
     else:

@@ -1,18 +1,17 @@
 """Weights files and run folders: read without running their code, written whole or not at all."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
-from yaml import YAMLError
 
 from charnerf.config import MODEL_SECTIONS, validate_model
+from charnerf.config.foreign import chosen_sections, parse_json, read_yaml
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import write_aside, write_text
 from charnerf.inference.build import build_model, build_renderer
@@ -50,9 +49,11 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
         validate_model(cfg, trusted_targets=trusted_targets)
     except ConfigError as error:
         raise ConfigError(f"{file}: its config can not be used. {error}") from error
-    with torch.random.fork_rng(devices=[]):  # first weights are drawn, to be overwritten
-        network = build_model(cfg)
     try:
+        with torch.random.fork_rng(devices=[]):  # first weights are drawn, to be overwritten
+            if not trusted_targets:  # own classes may do in their constructors what needs real tensors
+                _check_shapes(cfg, state)
+            network = build_model(cfg)
         network.load_state_dict(state, strict=True)
     except RuntimeError as error:
         raise DataError(
@@ -66,6 +67,22 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
         source=file,
         note=_note_of(file),
     )
+
+
+def _check_shapes(cfg: DictConfig, state: Mapping[str, Tensor]) -> None:
+    """Check, before any memory is taken, that a config means the network that the weights are of.
+
+    Raises:
+        RuntimeError: If it does not.
+    """
+    with torch.device("meta"):
+        expected = build_model(cfg).state_dict()
+    for name in [*expected, *state]:
+        if name not in state or name not in expected:
+            where = "config" if name in state else "weights"
+            raise RuntimeError(f"{name} is not in its {where}")
+        if not isinstance(state[name], Tensor) or state[name].shape != expected[name].shape:
+            raise RuntimeError(f"size mismatch for {name}, expected {tuple(expected[name].shape)}")
 
 
 def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig, *, note: str | None = None) -> Path:
@@ -110,24 +127,17 @@ def save_config(folder: Path, cfg: DictConfig) -> Path:
     return file
 
 
-def load_config(folder: Path) -> DictConfig:
-    """Read the `config.yaml` of a run folder; it is not validated.
+def load_config(folder: Path, sections: Sequence[str] | None = None) -> DictConfig:
+    """Read the `config.yaml` of a run folder, or some of its sections; it is not validated, and evaluates nothing.
 
     Raises:
         DataError: If there is none, or it is not YAML.
+        ConfigError: If a section holds an interpolation, or more than a config does.
     """
     file = folder / "config.yaml"
     if not file.is_file():
         raise DataError(f"{file}: does not exist, expected the config of a run; is {folder} a run folder?")
-    try:
-        cfg = OmegaConf.load(file)
-    except (YAMLError, OmegaConfBaseException, UnicodeDecodeError, OSError) as error:
-        raise DataError(
-            f"{file}: can not be read ({' '.join(str(error).split())[:200]}), expected YAML."
-        ) from error
-    if not isinstance(cfg, DictConfig):
-        raise DataError(f"{file}: found a list, expected sections.")
-    return cfg
+    return chosen_sections(read_yaml(file), sections, str(file))
 
 
 def run_folder(weights: Path) -> Path | None:
@@ -166,12 +176,8 @@ def _read_safetensors(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
             f"{file}: found format {metadata.get('format')!r} in its metadata, expected {FORMAT!r}; "
             "it was not written by this version of charnerf."
         )
-    try:
-        return OmegaConf.create(json.loads(metadata["config"])), state
-    except (KeyError, ValueError, OmegaConfBaseException) as error:
-        raise DataError(
-            f"{file}: its metadata holds no readable config ({error}); write it again from its run."
-        ) from error
+    plain = parse_json(metadata.get("config", ""), str(file))
+    return chosen_sections(plain, MODEL_SECTIONS, str(file)), state
 
 
 def _note_of(file: Path) -> str | None:
@@ -199,4 +205,5 @@ def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
             " folder."
         )
     prefix = "model."
-    return load_config(folder), {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
+    cfg = load_config(folder, MODEL_SECTIONS)
+    return cfg, {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
+from charnerf.config.foreign import read_yaml
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import DataError
@@ -155,15 +154,7 @@ def _name(path: Path, folder: Path) -> str:
 
 def _yaml(path: Path) -> Any:
     """Content of a YAML file, None where there is none."""
-    if not path.is_file():
-        return None
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        problem = " ".join(str(error).split())[:200]
-        raise DataError(
-            f"{path}: can not be read ({problem}), expected the YAML that a run wrote."
-        ) from error
+    return read_yaml(path) if path.is_file() else None
 
 
 def _cell_state(path: Path) -> tuple[str, str]:
