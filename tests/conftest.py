@@ -3,6 +3,9 @@
 import os
 from pathlib import Path
 
+# One thread a process, here and in those that tests start: on busy cores threads wait long for one another. Read when torch loads.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import pytest
 import torch
 

@@ -1,7 +1,6 @@
 """Cells of a grid: finished ones are skipped, killed ones go on, failed ones are recorded."""
 
 import json
-import os
 import subprocess
 import sys
 import textwrap
@@ -128,7 +127,6 @@ def test_a_cell_in_work_is_left_alone_and_a_killed_one_is_not(tmp_path):
         [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
     )
     assert process.stdout is not None
     assert process.stdout.readline() == b"begun\n"

@@ -18,7 +18,7 @@ from support import small_runs
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = ("encoder=single", "scale.steps=24", "validation.times=12")
-ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[1])}
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
 
 TRAINED = """
     import sys
@@ -37,16 +37,6 @@ TRAINED = """
 """
 
 
-@pytest.fixture
-def _one_thread():
-    """As the other process has it: sums over several threads round otherwise."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
-@pytest.mark.usefixtures("_one_thread")
 def test_a_cell_killed_in_the_middle_ends_as_the_one_that_was_not(figure_dataset, tmp_path):
     """kill -9 while it trains: the next start goes on from its checkpoint, to the same weights bit by bit."""
     grid = tmp_path / "grid"
