@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 # One thread a process, here and in those that tests start: on busy cores threads wait long for one another. Read when torch loads.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -24,6 +25,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for marker, variable in OPT_IN.items():
             if marker in item.keywords and marker not in asked and os.environ.get(variable) != "1":
                 item.add_marker(pytest.mark.skip(reason=f"opt in by -m {marker} or {variable}=1"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Under `-n` each file runs in one process, so that what its tests have in common is made once."""
+    from xdist.scheduler import LoadFileScheduling
+
+    return LoadFileScheduling(config, log)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -69,7 +69,7 @@ def test_the_command_is_declared() -> None:
 def test_ci_runs_what_the_readme_says() -> None:
     """The README's test command and the linters; the workflow runs the same."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    test = re.search(r"^ {4}(python -m pip install .* && python -m pytest)$", readme, re.MULTILINE)
+    test = re.search(r"^ {4}(python -m pip install .* && python -m pytest -n auto)$", readme, re.MULTILINE)
     assert test is not None
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8").replace(" --quiet", "")
     workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
