@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -94,44 +95,54 @@ def room_of(file: Path) -> str:
     return file.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_rooms_import_downward_only(file: Path) -> None:
-    room = room_of(file)
-    assert room in FLOOR_OF, f"{file}: room '{room}' is on no floor; put it into the list"
-    for line, name in imports_of(file):
-        if not name.startswith("charnerf."):
-            continue
-        other = name.split(".")[1]
-        if other != room and other in FLOOR_OF:
-            assert FLOOR_OF[other] < FLOOR_OF[room], (
-                f"{file}:{line}: {room} imports {other}, which is not below it"
-            )
+@cache
+def every_import() -> tuple[tuple[Path, int, str], ...]:
+    """File, line and full name of what the package imports."""
+    return tuple((file, line, name) for file in FILES for line, name in imports_of(file))
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_the_generator_has_one_face(file: Path) -> None:
+def test_rooms_import_downward_only() -> None:
+    homeless = {room_of(file) for file in FILES} - FLOOR_OF.keys()
+    assert not homeless, f"{homeless}: on no floor; put them into the list"
+    wrong = [
+        f"{file}:{line}: {room_of(file)} imports {other}, which is not below it"
+        for file, line, name in every_import()
+        for other in name.split(".")[1:2]
+        if name.startswith("charnerf.") and other != room_of(file) and other in FLOOR_OF
+        if FLOOR_OF[other] >= FLOOR_OF[room_of(file)]
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_generator_has_one_face() -> None:
     """Other rooms import what `charnerf.procedural` itself names, nothing inside."""
-    inside = [name for _, name in imports_of(file) if name.startswith("charnerf.procedural.")]
-    assert room_of(file) == "procedural" or not inside, (
-        f"{file}: imports {inside}, expected charnerf.procedural"
-    )
+    wrong = [
+        f"{file}:{line}: imports {name}, expected charnerf.procedural"
+        for file, line, name in every_import()
+        if name.startswith("charnerf.procedural.") and room_of(file) != "procedural"
+    ]
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_frameworks_stay_in_their_rooms(file: Path) -> None:
-    module = file.relative_to(PACKAGE).with_suffix("").as_posix()
-    for line, name in imports_of(file):
+def test_frameworks_stay_in_their_rooms() -> None:
+    wrong = []
+    for file, line, name in every_import():
+        module = file.relative_to(PACKAGE).with_suffix("").as_posix()
         places = ONLY_IN.get(name.split(".")[0])
-        if places is not None:
-            fine = any(module == place or module.startswith(f"{place}/") for place in places)
-            assert fine, f"{file}:{line}: imports {name}, which belongs to {', '.join(places)}"
+        if places is not None and not any(
+            module == place or module.startswith(f"{place}/") for place in places
+        ):
+            wrong.append(f"{file}:{line}: imports {name}, which belongs to {', '.join(places)}")
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_settings_of_the_process_belong_to_doors(file: Path) -> None:
-    if room_of(file) not in DOORS:
-        for line, name in imports_of(file):
-            assert not name.startswith("charnerf.process"), f"{file}:{line}: only doors set the process"
+def test_settings_of_the_process_belong_to_doors() -> None:
+    wrong = [
+        f"{file}:{line}: only doors set the process"
+        for file, line, name in every_import()
+        if name.startswith("charnerf.process") and room_of(file) not in DOORS
+    ]
+    assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.parametrize(
@@ -187,32 +198,35 @@ def test_no_drawer_for_leftovers() -> None:
     assert not names & {"utils", "util", "helpers", "misc", "common"}
 
 
-@pytest.mark.parametrize("file", [*FILES, ROOT / "train.py"], ids=lambda file: file.name)
-def test_files_stay_short(file: Path) -> None:
-    count = len(file.read_text(encoding="utf-8").splitlines())
-    assert count <= MAX_LINES, f"{file}: {count} lines, expected at most {MAX_LINES}; split it by idea"
+def test_files_stay_short() -> None:
+    lines = {file: len(file.read_text(encoding="utf-8").splitlines()) for file in [*FILES, ROOT / "train.py"]}
+    wrong = {str(file): count for file, count in lines.items() if count > MAX_LINES}
+    assert not wrong, f"{wrong}: expected at most {MAX_LINES} lines; split by idea"
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_functions_stay_short(file: Path) -> None:
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef):
-            count = (node.end_lineno or 0) - node.lineno + 1
-            assert count <= MAX_FUNCTION_LINES, (
-                f"{file}:{node.lineno}: {node.name} has {count} lines, expected at most {MAX_FUNCTION_LINES}; name a step of it"
-            )
+def test_functions_stay_short() -> None:
+    wrong = []
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                count = (node.end_lineno or 0) - node.lineno + 1
+                if count > MAX_FUNCTION_LINES:
+                    wrong.append(f"{file}:{node.lineno}: {node.name} has {count} lines")
+    assert not wrong, "\n".join([*wrong, f"expected at most {MAX_FUNCTION_LINES}; name a step of each"])
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_importing_changes_no_global_state(file: Path) -> None:
+def test_importing_changes_no_global_state() -> None:
     """No module seeds, sets threads or flags when it is imported."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    for statement in tree.body:
-        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-            continue
-        for node in ast.walk(statement):
-            called = getattr(getattr(node, "func", None), "attr", "")
-            assert called not in GLOBAL_SETTERS, f"{file}:{node.lineno}: {called} at import"  # type: ignore[attr-defined]
+    wrong = []
+    for file in FILES:
+        for statement in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+                continue
+            for node in ast.walk(statement):
+                called = getattr(getattr(node, "func", None), "attr", "")
+                if called in GLOBAL_SETTERS:
+                    wrong.append(f"{file}:{node.lineno}: {called} at import")  # type: ignore[attr-defined]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_the_rules_bite(tmp_path: Path) -> None:

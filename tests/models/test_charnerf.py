@@ -38,8 +38,17 @@ def person_hull(person_views) -> Hull:
     return tiny_models.tiny_model().carve(person_views)
 
 
-@pytest.mark.parametrize("features", ["image_hull", "image_hull_section", "image_hull_section_consistency"])
-@pytest.mark.parametrize("hull_from", ["batch", "characters"])
+@pytest.mark.parametrize(
+    ("hull_from", "features"),
+    [
+        ("batch", "image_hull"),
+        ("batch", "image_hull_section"),
+        ("batch", "image_hull_section_consistency"),
+        ("characters", "image_hull_section_consistency"),
+        pytest.param("characters", "image_hull", marks=pytest.mark.slow),
+        pytest.param("characters", "image_hull_section", marks=pytest.mark.slow),
+    ],
+)
 def test_characters_of_different_numbers_of_views_share_a_batch(hull_from, features):
     """In any batch each gets the answer that it gets alone, carved in the batch or each by itself before."""
     model = tiny_models.shake(tiny_models.tiny_model(views="mirrored", features=features))

@@ -1,5 +1,7 @@
 """Grown models: the same answers everywhere, gradients for what is new, and refusals."""
 
+import itertools
+
 import pytest
 import torch
 from hypothesis import given, settings
@@ -18,10 +20,15 @@ def pair(*, width: int = 20, num_blocks: int = 2, **options) -> tuple[torch.nn.M
     return small, tiny_models.tiny_model(width=width, num_blocks=num_blocks, **options)
 
 
-@pytest.mark.parametrize("combining", ["mean", "learned"])
-@pytest.mark.parametrize("head", ["blend", "radiance"])
-@pytest.mark.parametrize("density", ["view_free", "view_dependent"])
-@pytest.mark.parametrize("fine", [False, True])
+def combinations():
+    """Any three of the choices in every combination, in half of the cases; the other half is slow."""
+    choices = (("mean", "learned"), ("blend", "radiance"), ("view_free", "view_dependent"), (False, True))
+    for picks in itertools.product((0, 1), repeat=4):
+        values = (options[pick] for options, pick in zip(choices, picks, strict=True))
+        yield pytest.param(*values, marks=[pytest.mark.slow] if sum(picks) % 2 else [])
+
+
+@pytest.mark.parametrize(("combining", "head", "density", "fine"), list(combinations()))
 def test_a_grown_model_answers_as_the_small_one(person_views, combining, head, density, fine):
     options = {"combining": combining, "head": head, "density": density, "fine": fine}
     small, large = pair(**options)

@@ -22,7 +22,6 @@ ALWAYS = (
     "character fills the frame",
     "character leaves the frame",
     "all views empty, without a hull",
-    "loss spike of 1e12",
     "phase switch",
     "bfloat16 autocast",
 )
@@ -54,6 +53,7 @@ def test_an_empty_view_is_named():
 def test_a_spike_is_forgotten(ordinary):
     """One batch of loss 1e12 must not undo the training: gradients are clipped."""
     spiked = stiff.cases()["loss spike of 1e12"]()
+    assert spiked.finite
     assert max(spiked.losses) > 1e9
     assert spiked.losses[-1] < spiked.losses[0]
 
@@ -63,7 +63,7 @@ def test_an_ordinary_training_learns_and_stays_opaque(ordinary):
     assert ordinary.opacity > 0.5
 
 
-@pytest.mark.parametrize("unit", ["in millimetres", "in kilometres"])
+@pytest.mark.parametrize("unit", ["in millimetres", pytest.param("in kilometres", marks=pytest.mark.slow)])
 def test_the_unit_of_length_changes_nothing(ordinary, unit):
     """Alpha Invariance (2024): with the density scaled by the scene's length every step is the same."""
     other = stiff.cases()[unit]()
