@@ -10,18 +10,22 @@ from scipy import ndimage
 from skimage.color import rgb2lab
 from skimage.measure import label
 
+from charnerf.drawings.background import Background, find_background
 from charnerf.drawings.load import Drawing
+from charnerf.drawings.surroundings import (
+    count_figures,
+    cropped,
+    frame_window,
+    shadow_by_alpha,
+    shadow_on_paper,
+)
 from charnerf.errors import DataError
 from charnerf.pictures import on_white
 
 ALPHA_SHARE = 0.04  # of the pixels must be transparent for alpha to count (rounded corners do not)
-RING = 0.02  # of the longer side: the border whose colours tell the background
-MODE_TOLERANCE = 14.0  # CIELAB distance from the commonest border colour that still is background
-PLAIN_SHARE = 0.4  # of the border must be of one colour for the background to count as plain
-LEAST_TOLERANCE = 2.5  # CIELAB distance: just about seen
-HALO_TOLERANCE = 6.0  # CIELAB distance; about what JPEG and resizing do to a flat colour beside an outline
-HALO_WIDTH = {False: 3, True: 8}  # pixels that such a halo is wide, without and with lossy compression
 SPECK_SHARE = 0.0005  # of the figure's area: smaller parts are noise
+FRAME_CONTRAST = 20.0  # CIELAB distance from the paper of what may be a frame
+SHADOW_NOTE = "a shadow on the ground was left out"
 FILLED_SHARE = 0.95  # a figure that fills this share of the frame was not cut out
 
 
@@ -43,18 +47,28 @@ def cut_out(drawing: Drawing) -> Cutout:
 
     Alpha is used where it carries information. Otherwise the background's colour is read off the border (with
     a slow gradient, as paper has), everything of that colour that is connected to the border goes, and the
-    outline gets soft alpha. Regions of background colour that the figure encloses stay: they are more often
-    white clothes than holes.
+    outline gets soft alpha. A frame around the picture and a shadow on the ground go too. Regions of background
+    colour that the figure encloses stay: they are more often white clothes than holes.
 
     Raises:
-        DataError: If the border is not plain or no figure remains.
+        DataError: If the border is not plain, no figure remains, or several of one size do.
     """
     if has_alpha(drawing.rgba[..., 3]):
         rgba, notes = drawing.rgba.copy(), ["cut out by its alpha"]
+        shadow = shadow_by_alpha(rgba)
+        if shadow.any():
+            notes.append(SHADOW_NOTE)
+            rgba[..., 3] *= ~shadow
         rgba[..., 3] *= _without_specks(rgba[..., 3] > 0.5, notes, margin=2)
     else:
         rgba, notes = _by_background(drawing)
     figure = rgba[..., 3] > 0.5
+    count = count_figures(figure)
+    if count > 1:
+        raise DataError(
+            f"{drawing.name}: found {count} figures side by side, expected one: it looks like a sheet. Give it alone, as"
+            " `charnerf reconstruct SHEET -o DIR`, or crop it to one figure."
+        )
     share = float(figure.mean())
     if share < 0.002:
         raise DataError(
@@ -76,65 +90,23 @@ def has_alpha(alpha: np.ndarray) -> bool:
     return ALPHA_SHARE < clear < 1.0 - 1e-4
 
 
-@dataclass(frozen=True)
-class Background:
-    """What of a drawing is plain background.
-
-    Attributes:
-        mask: Connected to the border and of its colour, (H, W) bool.
-        distance: CIELAB distance of each pixel from the background's colour there, (H, W).
-        tolerance: Distance up to which a pixel is of that colour.
-        rgb: Its colour, (3,), in [0, 1].
-    """
-
-    mask: np.ndarray
-    distance: np.ndarray
-    tolerance: float
-    rgb: np.ndarray
-
-
-def find_background(drawing: Drawing) -> Background:
-    """Find the plain background that a drawing's border shows.
-
-    Raises:
-        DataError: If the border is not plain.
-    """
-    rgb = on_white(drawing.rgba)
-    lab = rgb2lab(rgb)
-    ring = _ring(lab.shape[:2])
-    inlier = _commonest(lab[ring])
-    plain = float(inlier.mean())
-    if plain < PLAIN_SHARE:
-        raise DataError(
-            f"{drawing.name}: found a border of which only {100 * plain:.0f} % is of one colour, expected a "
-            "plain background or "
-            "alpha. Paint the background in one colour, or save the figure with a transparent one."
-        )
-    background = _fit_background(lab, ring, inlier)
-    distance = np.linalg.norm(lab - background, axis=-1)
-    noise = np.percentile(distance[ring][inlier], 99.0)
-    tolerance = float(np.clip(1.5 * noise, LEAST_TOLERANCE, MODE_TOLERANCE))
-    regions = label(distance <= tolerance, connectivity=1)
-    outside = np.unique(regions[ring & (regions > 0)])
-    mask = np.isin(regions, outside[outside > 0])
-    # a faint halo goes too, but only so far: light clothes must not leak away through a faint outline
-    mask = ndimage.binary_dilation(
-        mask,
-        mask=mask | (distance <= max(tolerance, HALO_TOLERANCE)),
-        iterations=HALO_WIDTH[drawing.lossy],
-    )
-    return Background(mask, distance, tolerance, np.median(rgb[ring][inlier], axis=0))
-
-
 def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
     """Cut out a figure from the background that its border shows."""
+    notes: list[str] = []
     background = find_background(drawing)
     figure = ~background.mask
+    window = frame_window(background.distance > FRAME_CONTRAST)
+    if window is not None:
+        drawing = cropped(drawing, window)
+        background = find_background(drawing)
+        figure = ~background.mask
+        notes.append("a frame or an edge around the picture was left out")
     color = (255 * background.rgb).round().astype(int)
-    notes = [
-        f"cut out from a background of about RGB {color[0]}, {color[1]}, {color[2]} (tolerance "
+    kind = "a drawn checkerboard, taken for transparency" if background.is_checkered else "a background"
+    notes.append(
+        f"cut out from {kind} of about RGB {color[0]}, {color[1]}, {color[2]} (tolerance "
         f"{background.tolerance:.0f} in CIELAB)"
-    ]
+    )
     if float(figure.mean()) > FILLED_SHARE:
         raise DataError(
             f"{drawing.name}: found no background (the figure would fill {100 * float(figure.mean()):.0f} % "
@@ -142,44 +114,19 @@ def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
             "expected a figure on a plain background. Leave a margin, or save it with a transparent "
             "background."
         )
+    shadow = shadow_on_paper(rgb2lab(on_white(drawing.rgba)), background.lab, figure)
+    if shadow.any():
+        notes.append(SHADOW_NOTE)
+        figure &= ~(shadow | _fenced_in(background, figure, shadow))
     figure = _without_specks(figure, notes, margin=0)
     return _soft_outline(on_white(drawing.rgba), figure), notes
 
 
-def _ring(shape: tuple[int, int]) -> np.ndarray:
-    """The border's pixels, (H, W) bool."""
-    width = max(1, round(RING * max(shape)))
-    ring = np.ones(shape, bool)
-    ring[width:-width, width:-width] = False
-    return ring
-
-
-def _commonest(colors: np.ndarray) -> np.ndarray:
-    """Which of the colours (P, 3), CIELAB, belong to the commonest one, (P,) bool."""
-    bins = np.round(colors / 6.0).astype(int)
-    _, index, counts = np.unique(bins, axis=0, return_inverse=True, return_counts=True)
-    mode = colors[index.reshape(-1) == counts.argmax()].mean(0)
-    for _ in range(3):
-        inlier = np.linalg.norm(colors - mode, axis=1) < MODE_TOLERANCE
-        mode = colors[inlier].mean(0)
-    return inlier
-
-
-def _fit_background(lab: np.ndarray, ring: np.ndarray, inlier: np.ndarray) -> np.ndarray:
-    """Background colour everywhere, (H, W, 3): a quadratic surface through the border's background pixels."""
-    height, width = ring.shape
-    y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
-    terms = np.stack((np.ones_like(x), x, y, x * y, x * x, y * y), axis=-1)
-    basis, colors = terms[ring], lab[ring]
-    used = inlier
-    for _ in range(2):  # the second time with the border pixels that a gradient had put out of reach
-        weight, *_ = np.linalg.lstsq(
-            np.concatenate((basis[used], 1e-2 * np.sqrt(used.sum()) * np.diag([0, 1, 1, 1, 1, 1]))),
-            np.concatenate((colors[used], np.zeros((6, 3)))),
-            rcond=None,
-        )
-        used = used | (np.linalg.norm(colors - basis @ weight, axis=1) < HALO_TOLERANCE)
-    return terms @ weight
+def _fenced_in(background: Background, figure: np.ndarray, shadow: np.ndarray) -> np.ndarray:
+    """Paper (H, W) bool that a shadow alone cut off from the border's, as between legs."""
+    paper = label((background.distance <= background.tolerance) & figure, connectivity=1)
+    beside = np.unique(paper[ndimage.binary_dilation(shadow, iterations=3)])
+    return np.isin(paper, beside[beside > 0])
 
 
 def _without_specks(figure: np.ndarray, notes: list[str], *, margin: int) -> np.ndarray:

@@ -1,17 +1,19 @@
 """Reading picture files of any kind, size and crop; what can not be used is said with the file's name."""
 
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
 from charnerf.errors import DataError
 
 LARGEST = 200_000_000  # pixels; above, the file is refused before it is decoded
 SMALLEST = 16  # pixels a side
 LOSSY = ("JPEG", "MPO", "WEBP", "JPEG2000", "AVIF")
+_PROFILED = ("RGB", "RGBA", "CMYK", "L")  # modes whose profile is of the pixels as they are
 WORKING = 1536  # pixels; a longer side is reduced to this at once
 
 
@@ -54,7 +56,7 @@ def load_drawing(path: str | Path) -> Drawing:
         with Image.open(path) as picture:
             size, lossy = picture.size, picture.format in LOSSY
             _check_size(str(path), size)
-            rgba = _to_rgba(picture)
+            rgba = _to_rgba(picture, str(path))
     except UnidentifiedImageError as err:
         raise DataError(
             f"{path}: found a file that is no picture, expected PNG, JPEG or WebP. Export it again."
@@ -117,10 +119,34 @@ def _check_size(name: str, size: tuple[int, int]) -> None:
         )
 
 
-def _to_rgba(picture: Image.Image) -> np.ndarray:
-    """Decode to (H, W, 4) float32, turned as the camera's note says, 16-bit grey scaled down."""
+def _to_srgb(picture: Image.Image, name: str) -> Image.Image:
+    """The picture with colours as sRGB has them, where it brings another profile.
+
+    Raises:
+        DataError: If the profile can not be read.
+    """
+    profile = picture.info.get("icc_profile")
+    if not profile or picture.mode not in _PROFILED:
+        return picture
+    try:
+        given = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        if "srgb" in ImageCms.getProfileDescription(given).lower():
+            return picture
+        mode = "RGBA" if picture.mode == "RGBA" else "RGB"
+        converted = ImageCms.profileToProfile(picture, given, ImageCms.createProfile("sRGB"), outputMode=mode)
+    except (ImageCms.PyCMSError, OSError) as err:
+        raise DataError(
+            f"{name}: found a colour profile that can not be used ({err}), expected one of its colours, or none. Export it"
+            " again as sRGB."
+        ) from err
+    assert converted is not None  # only with inPlace
+    return converted
+
+
+def _to_rgba(picture: Image.Image, name: str) -> np.ndarray:
+    """Decode to (H, W, 4) float32 sRGB, turned as the camera's note says, 16-bit grey scaled down."""
     picture.draft("RGB", (WORKING, WORKING))  # JPEG only: decodes a large one reduced
-    turned = ImageOps.exif_transpose(picture)
+    turned = _to_srgb(ImageOps.exif_transpose(picture), name)
     if turned.mode.startswith("I") or turned.mode == "F":
         grey = np.asarray(turned, np.float64)
         scale = 65535.0 if grey.max() > 255.0 else 255.0

@@ -10,7 +10,8 @@ import numpy as np
 from scipy import ndimage
 from skimage.measure import label, regionprops
 
-from charnerf.drawings.cutout import find_background, has_alpha
+from charnerf.drawings.background import find_background
+from charnerf.drawings.cutout import has_alpha
 from charnerf.drawings.load import Drawing
 from charnerf.errors import DataError
 
