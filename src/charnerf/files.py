@@ -1,13 +1,76 @@
-"""Files that are there whole or not at all: written beside their place, then renamed into it; and locks between processes."""
+"""Files that are there whole or not at all: written beside their place, then renamed into it; what may be read; and locks."""
 
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from charnerf.errors import DataError
+
+MOST_TEXT = 64 * 2**20  # bytes of a file that is read whole, such as JSON
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file for reading; a pipe, which may wait for ever, and a device, which may never end, are refused.
+
+    Raises:
+        DataError: If it is one of these, a folder, or its name can be no file's.
+        OSError: If it can not be opened.
+    """
+    try:
+        mode = path.stat().st_mode
+    except ValueError as error:  # NUL, or half of a character
+        raise DataError(f"{str(path)!r}: can not be a file's name ({error}).") from error
+    if not stat.S_ISREG(mode):
+        what = "a folder" if stat.S_ISDIR(mode) else "a pipe, socket or device"
+        raise DataError(f"{path}: found {what}, expected a file.")
+    return path.open("rb")
+
+
+def read_text(path: Path, *, most: int = MOST_TEXT) -> str:
+    """Content of a text file in UTF-8.
+
+    Raises:
+        DataError: If it is no file, or larger than `most` bytes.
+        OSError: If it can not be opened.
+        UnicodeDecodeError: If it is not UTF-8.
+    """
+    with open_regular(path) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise DataError(f"{path}: found more than {most} bytes, expected fewer.")
+    return content.decode("utf-8")
+
+
+def inside(folder: Path, name: str, where: str) -> Path:
+    """A file that a folder names, which lies in that folder; the folder itself may be a link, its files may not lead out.
+
+    Args:
+        folder: The folder.
+        name: Relative to it.
+        where: What a message names: the file and key that hold the name.
+
+    Raises:
+        DataError: If it lies elsewhere, also by a link, or can be no file's name.
+    """
+    try:
+        home = folder.resolve()
+        file = folder / name
+        is_inside = not Path(name).is_absolute() and ".." not in Path(name).parts
+        file.exists()  # says whether the name is too long
+        if is_inside and file.resolve().is_relative_to(home):
+            return file
+    except (ValueError, OSError, RuntimeError) as error:  # NUL, too long, a loop of links
+        raise DataError(
+            f"{where}: found {name[:60]!r}, which is no file's name ({str(error)[:60]})."
+        ) from error
+    raise DataError(
+        f"{where}: found {name[:200]!r}, which leads out of {folder}; expected a file inside it. Copy it there."
+    )
 
 
 @contextmanager

@@ -1,5 +1,8 @@
 """Pictures: on white, as bytes, read between pixels, and PNG files."""
 
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -9,7 +12,11 @@ from PIL import Image
 from scipy import ndimage
 from torch import Tensor
 
-from charnerf.files import write_aside
+from charnerf.errors import DataError
+from charnerf.files import open_regular, write_aside
+
+FORMATS = ("PNG", "JPEG", "MPO", "WEBP", "GIF", "BMP", "TIFF", "JPEG2000", "AVIF", "TGA")
+LARGEST = 200_000_000  # pixels; above, a picture is refused before it is decoded
 
 Array = TypeVar("Array", Tensor, np.ndarray)
 
@@ -43,6 +50,50 @@ def read_bilinear(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
         for channel in np.moveaxis(picture, -1, 0)
     ]
     return np.stack(channels, axis=1)
+
+
+@contextmanager
+def open_picture(source: Path | bytes, name: str | None = None) -> Iterator[Image.Image]:
+    """A picture, not yet decoded, of one of FORMATS, whatever its suffix says: others start programs, such as Ghostscript.
+
+    Args:
+        source: A file, or the content of one.
+        name: What to call it in messages; the file's path if None.
+
+    Raises:
+        DataError: If it has too many pixels, or is no file.
+        OSError: If it can not be opened, or is of another format (`UnidentifiedImageError`).
+    """
+    name = name or str(source)
+    with io.BytesIO(source) if isinstance(source, bytes) else open_regular(source) as stream:
+        limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # our own check, with the file's name
+        try:
+            picture = Image.open(stream, formats=readable_formats())
+        finally:
+            Image.MAX_IMAGE_PIXELS = limit
+        with picture:
+            check_pixels(name, picture.size)
+            yield picture
+
+
+def check_pixels(name: str, size: tuple[int, int]) -> None:
+    """Check that a picture of some width and height is not too large to be decoded.
+
+    Raises:
+        DataError: If it is.
+    """
+    width, height = size
+    if width * height > LARGEST:
+        raise DataError(
+            f"{name}: found {width} x {height} pixels, expected at most {LARGEST // 10**6} million. Reduce "
+            "the picture."
+        )
+
+
+def readable_formats() -> list[str]:
+    """Those of FORMATS that this Pillow was built with."""
+    Image.init()
+    return [one for one in FORMATS if one in Image.OPEN]
 
 
 def save_png(path: Path, picture: Image.Image) -> None:

@@ -1,15 +1,13 @@
 """Mesh files to scenes in the world frame: +Z up, facing -Y, 2 m tall, feet on z = 0, centred."""
 
-import json
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
 
 from charnerf.errors import ConfigError, DataError
 from charnerf.geometry.world import HEIGHT
+from charnerf.surfaces.foreign_files import gltf_header, load_file
 from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -49,8 +47,8 @@ def load_scene(path: str | Path, up: str | None = None, facing: str | None = Non
         raise DataError(f"{path}: no such file, expected a mesh.")
     rotation = axes_rotation(*file_axes(suffix, up, facing))
     try:
-        scene = trimesh.load_scene(path, process=False)
-    except (MemoryError, KeyboardInterrupt):
+        scene = load_file(path)
+    except (MemoryError, KeyboardInterrupt, DataError):
         raise
     except Exception as err:  # trimesh's readers raise every kind
         raise DataError(
@@ -158,7 +156,7 @@ def _note_colors(scene: trimesh.Scene, path: Path) -> None:
             mesh.metadata[COLORS_KEY] = "srgb"
         return
     factors: dict[str, list[np.ndarray]] = {}
-    for material in _gltf_header(path).get("materials", []):
+    for material in gltf_header(path).get("materials", []):
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         if factor is not None:
             factors.setdefault(material.get("name"), []).append(np.array(factor, dtype=np.float64))
@@ -170,11 +168,3 @@ def _note_colors(scene: trimesh.Scene, path: Path) -> None:
             if np.abs(factor * 255.0 - kept).max() <= 1.0:
                 mesh.metadata[FACTOR_KEY] = factor.tolist()
                 break
-
-
-def _gltf_header(path: Path) -> dict[str, Any]:
-    content = path.read_bytes()
-    if content[:4] == b"glTF":
-        (length,) = struct.unpack_from("<I", content, 12)
-        content = content[20 : 20 + length]
-    return json.loads(content)

@@ -59,7 +59,8 @@ Trusted = Annotated[
     ),
 ]
 Views = Annotated[
-    int, typer.Option(min=1, help="Target pictures a character, spread over the upper hemisphere.")
+    int,
+    typer.Option(min=1, max=10_000, help="Target pictures a character, spread over the upper hemisphere."),
 ]
 Size = Annotated[int, typer.Option(min=8, max=4096, help="Side of every picture, pixels.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; one a core if left out.")]

@@ -14,7 +14,9 @@ from torch import Tensor
 from charnerf.data.layout import MESH_FILE, TRANSFORMS_FILE, check_name
 from charnerf.data.transforms import read_transforms, transforms_text
 from charnerf.errors import DataError
+from charnerf.files import inside
 from charnerf.geometry.framing import SOURCE_ORDER
+from charnerf.pictures import open_picture
 from charnerf.types import Cameras, SourceViews
 
 DEPTH_FOLDER = "depth"
@@ -108,6 +110,7 @@ def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Char
             matrix is wrong, or there are
             fewer source views than asked.
     """
+    check_name("character", name)
     folder = Path(root) / name
     if not folder.is_dir():
         raise DataError(
@@ -125,7 +128,7 @@ def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Char
     cameras = files.source_cameras[order]
     size = (cameras.width, cameras.height)
     images = torch.stack([read_rgba(files.source_files[index], size) for index in order])
-    mesh_file = folder / MESH_FILE
+    mesh_file = inside(folder, MESH_FILE, str(folder))
     return Character(
         name=name,
         folder=folder,
@@ -208,10 +211,12 @@ def _read_depth(path: Path, size: tuple[int, int]) -> Tensor:
 
 def _read_image(path: Path, size: tuple[int, int], modes: Sequence[str], convert: str | None) -> np.ndarray:
     try:
-        with Image.open(path) as image:
+        with open_picture(path) as image:
             stored, mode = image.size, image.mode
             if stored == size and (convert or mode in modes):
                 return np.array(image.convert(convert) if convert else image)
+    except DataError:
+        raise
     except FileNotFoundError as err:
         raise DataError(f"{path}: no such file; restore it or capture the character again.") from err
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as err:

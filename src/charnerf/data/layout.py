@@ -9,13 +9,14 @@ Names of folders that begin with a dot are characters being written; nothing rea
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from charnerf.errors import DataError
-from charnerf.files import locked, write_text
+from charnerf.files import locked, read_text, write_text
 
 FORMAT = "charnerf-dataset"
 VERSION = 1
@@ -23,6 +24,7 @@ DATASET_FILE = "dataset.json"
 TRANSFORMS_FILE = "transforms.json"
 MESH_FILE = "mesh/mesh.obj"
 
+_VIEW_NAME = re.compile(r"[^/\\\x00-\x1f\x7f\ud800-\udfff]{1,100}")
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]*")
 
 
@@ -49,8 +51,20 @@ def check_name(kind: str, name: str) -> None:
     """
     if not _NAME.fullmatch(name):
         raise DataError(
-            f"{kind} {name!r}: expected letters, digits and _ - + . only, not beginning with a dot; "
+            f"{kind} {name[:100]!r}: expected letters, digits and _ - + . only, not beginning with a dot; "
             f"rename it."
+        )
+
+
+def check_view_name(where: str, name: str) -> None:
+    """Check that the name of a source view can be a file's.
+
+    Raises:
+        DataError: If it can not.
+    """
+    if not _VIEW_NAME.fullmatch(name) or name.startswith("."):
+        raise DataError(
+            f"{where}: found the view {name[:100]!r}, expected a name such as front or 45,20; rename it."
         )
 
 
@@ -61,12 +75,18 @@ def read_json(path: Path) -> dict[str, Any]:
         DataError: If the file is missing, unreadable or holds anything else.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
+    except DataError:
+        raise
     except FileNotFoundError as err:
         raise DataError(
             f"{path}: no such file; expected a data set as `charnerf capture` writes it."
         ) from err
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as err:
+    except (
+        OSError,
+        ValueError,
+        RecursionError,
+    ) as err:  # ValueError: no UTF-8, no JSON, numbers of thousands of digits
         raise DataError(f"{path}: can not be read as JSON ({err}); write it again.") from err
     if not isinstance(content, dict):
         raise DataError(f"{path}: found a JSON {type(content).__name__}, expected an object.")
@@ -95,14 +115,15 @@ def read_dataset(root: str | Path) -> DatasetInfo:
         )
     splits = content.get("splits")
     if not isinstance(splits, dict):
-        raise DataError(f"{path}: splits: found {splits!r}, expected an object of lists of names.")
+        raise DataError(f"{path}: splits: found {repr(splits)[:60]}, expected an object of lists of names.")
     for split, names in splits.items():
+        check_name(f"{path}: split", split)
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise DataError(f"{path}: splits.{split}: found {names!r}, expected a list of names.")
+            raise DataError(f"{path}: splits.{split}: found {repr(names)[:60]}, expected a list of names.")
         for name in names:
             check_name(f"{path}: splits.{split}: character", name)
         if len(set(names)) != len(names):
-            twice = sorted({name for name in names if names.count(name) > 1})
+            twice = sorted(name for name, count in Counter(names).items() if count > 1)
             raise DataError(
                 f"{path}: splits.{split}: found {', '.join(twice)} more than once; keep each name once."
             )

@@ -14,11 +14,15 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from charnerf.data.layout import TRANSFORMS_FILE, read_json
+from charnerf.data.layout import TRANSFORMS_FILE, check_view_name, read_json
 from charnerf.errors import DataError
+from charnerf.files import inside
 from charnerf.types import Cameras
 
+MOST_FRAMES = 10_000  # of a character
+MOST_PIXELS = 16_384  # a side
 AABB_SCALE = 4  # instant-ngp's box of 4 units holds cameras and character under its default scale and offset
+_LARGEST = 1e30  # of any number of a camera
 _DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 
 
@@ -105,11 +109,13 @@ def read_transforms(folder: Path) -> CharacterFiles:
     Raises:
         DataError: If a key or file is missing or a number or matrix is wrong; the message names file and key.
     """
-    path = folder / TRANSFORMS_FILE
+    path = inside(folder, TRANSFORMS_FILE, str(folder))
     content = read_json(path)
     frames = content.get("frames")
     if not isinstance(frames, list) or not frames:
         raise DataError(f"{path}: frames: found {_short(frames)}, expected a list of at least one frame.")
+    if len(frames) > MOST_FRAMES:
+        raise DataError(f"{path}: frames: found {len(frames)}, expected at most {MOST_FRAMES}.")
     merged = [{**content, **_object(path, f"frames[{index}]", frame)} for index, frame in enumerate(frames)]
     where = [f"{path}: frames[{index}]" for index in range(len(frames))]
     depth_keys = ["depth_file_path" in frame for frame in merged]
@@ -118,6 +124,8 @@ def read_transforms(folder: Path) -> CharacterFiles:
             f"{where[depth_keys.index(False)]}: has no depth_file_path while others have; give all or none."
         )
     sources = _object(path, "source_views", content.get("source_views", {}))
+    for name in sources:
+        check_view_name(f"{path}: source_views", name)
     source_where = [f"{path}: source_views.{name}" for name in sources]
     source_frames = [_object(path, f"source_views.{name}", source) for name, source in sources.items()]
     if not sources:
@@ -142,7 +150,7 @@ def check_pose(where: str, matrix: Any) -> Tensor:
     """
     try:
         pose = torch.tensor(matrix, dtype=torch.float64)
-    except (TypeError, ValueError) as err:
+    except (TypeError, ValueError, RuntimeError, OverflowError) as err:
         raise DataError(f"{where}: found {_short(matrix)}, expected a 4x4 matrix of numbers.") from err
     if pose.shape != (4, 4):
         raise DataError(f"{where}: found shape {tuple(pose.shape)}, expected a 4x4 matrix.")
@@ -227,9 +235,9 @@ def _files(
         name = frame.get(key)
         if not isinstance(name, str) or not name:
             raise DataError(f"{place}.{key}: found {_short(name)}, expected a file relative to {folder}.")
-        file = folder / name
+        file = inside(folder, name, f"{place}.{key}")
         if not file.suffix and not file.exists():
-            file = file.with_name(file.name + ".png")
+            file = inside(folder, f"{name}.png", f"{place}.{key}")
         if not file.is_file():
             raise DataError(
                 f"{file}: no such file, named by {place}.{key}; restore it or capture the character again."
@@ -242,14 +250,16 @@ def _count(where: str, frame: Mapping[str, Any], key: str) -> int:
     value = frame.get(key)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-        raise DataError(f"{where}.{key}: found {_short(value)}, expected a number of pixels, 1 or more.")
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= MOST_PIXELS:
+        raise DataError(
+            f"{where}.{key}: found {_short(value)}, expected a number of pixels, 1 or more, at most {MOST_PIXELS}."
+        )
     return value
 
 
 def _number(where: str, frame: Mapping[str, Any], key: str, default: float | None) -> float:
     value = frame.get(key, default)
-    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _LARGEST:
         raise DataError(f"{where}.{key}: found {_short(value)}, expected a finite number.")
     return float(value)
 

@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
 from charnerf.errors import DataError
+from charnerf.pictures import check_pixels, open_picture
 
-LARGEST = 200_000_000  # pixels; above, the file is refused before it is decoded
 SMALLEST = 16  # pixels a side
 LOSSY = ("JPEG", "MPO", "WEBP", "JPEG2000", "AVIF")
 _PROFILED = ("RGB", "RGBA", "CMYK", "L")  # modes whose profile is of the pixels as they are
@@ -39,7 +39,7 @@ def load_drawing(path: str | Path) -> Drawing:
     """Read a picture file.
 
     Args:
-        path: PNG, JPEG, WebP or whatever else Pillow reads; of an animation the first frame.
+        path: PNG, JPEG, WebP or another of `pictures.FORMATS`; of an animation the first frame.
 
     Raises:
         DataError: If the file is missing, empty, broken, no picture, too large, too small or fully
@@ -47,13 +47,12 @@ def load_drawing(path: str | Path) -> Drawing:
     """
     path = Path(path)
     if not path.is_file():
-        what = "a folder" if path.is_dir() else "nothing"
+        what = "a folder" if path.is_dir() else "a pipe or device" if path.exists() else "nothing"
         raise DataError(f"{path}: found {what}, expected a picture file (PNG, JPEG, WebP). Check the path.")
     if path.stat().st_size == 0:
         raise DataError(f"{path}: found an empty file of 0 bytes, expected a picture. Export it again.")
-    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # our own check, with the file's name
     try:
-        with Image.open(path) as picture:
+        with open_picture(path) as picture:
             size, lossy = picture.size, picture.format in LOSSY
             _check_size(str(path), size)
             rgba = _to_rgba(picture, str(path))
@@ -67,8 +66,6 @@ def load_drawing(path: str | Path) -> Drawing:
         raise DataError(
             f"{path}: found a broken picture ({err}), expected one that opens whole. Export it again."
         ) from err
-    finally:
-        Image.MAX_IMAGE_PIXELS = limit
     return _checked(rgba, str(path), size, lossy)
 
 
@@ -107,11 +104,7 @@ def _checked(rgba: np.ndarray, name: str, size: tuple[int, int], lossy: bool) ->
 
 def _check_size(name: str, size: tuple[int, int]) -> None:
     width, height = size
-    if width * height > LARGEST:
-        raise DataError(
-            f"{name}: found {width} x {height} pixels, expected at most {LARGEST // 10**6} million. Reduce "
-            "the picture."
-        )
+    check_pixels(name, size)
     if min(width, height) < SMALLEST:
         raise DataError(
             f"{name}: found {width} x {height} pixels, expected at least {SMALLEST} a side. Use a larger "

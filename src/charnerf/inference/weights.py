@@ -44,6 +44,8 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
         raise DataError(f"{file}: does not exist, expected a run folder, a .ckpt or a .safetensors.")
     if file.is_dir():
         file = _weights_of_run(file)
+    if not file.is_file():
+        raise DataError(f"{file}: found a pipe or device, expected a run folder, a .ckpt or a .safetensors.")
     cfg, state = _read_safetensors(file) if file.suffix == ".safetensors" else _read_checkpoint(file)
     try:
         validate_model(cfg, trusted_targets=trusted_targets)

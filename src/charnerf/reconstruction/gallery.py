@@ -10,7 +10,7 @@ from charnerf.errors import DataError
 from charnerf.files import write_aside
 from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
-from charnerf.pictures import bytes_on_white
+from charnerf.pictures import bytes_on_white, open_picture
 from charnerf.reconstruction.turntable import ELEVATION_DEG
 
 AZIMUTHS_DEG = (30, 60, 135, 225, 315)  # between and behind the drawings
@@ -92,7 +92,7 @@ def _left(column: int, size: int) -> int:
 
 def _fitted(file: Path, size: int) -> Image.Image:
     """A drawing as it was given, on white, in a square panel."""
-    with Image.open(file) as opened:
+    with open_picture(file) as opened:
         pixels = bytes_on_white(np.asarray(ImageOps.exif_transpose(opened).convert("RGBA")))
     return ImageOps.pad(Image.fromarray(pixels), (size, size), Image.Resampling.LANCZOS, color="white")
 

@@ -10,10 +10,9 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
 from charnerf.files import write_text
 from charnerf.markdown import table
+from charnerf.pictures import open_picture
 
 STILL = (
     "The diagrams of report.html are still pictures, because plotly is not installed. For ones to point at and zoom: "
@@ -224,7 +223,7 @@ def _embedded(path: Path) -> str:
     content, kind = path.read_bytes(), "png"
     if len(content) > 200_000:
         buffer = io.BytesIO()
-        with Image.open(path) as picture:
+        with open_picture(path) as picture:
             picture.convert("RGB").save(buffer, format="JPEG", quality=90, subsampling=0)
         if buffer.tell() < len(content):
             content, kind = buffer.getvalue(), "jpeg"

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 
-from charnerf.pictures import bytes_on_white, save_png, to_bytes
+from charnerf.pictures import bytes_on_white, open_picture, save_png, to_bytes
 
 CELL = 128  # pixels
 _INK = (60, 60, 60)
@@ -17,7 +17,7 @@ _GAP = 6
 
 def open_on_white(path: Path) -> Image.Image:
     """A picture file on white, RGB."""
-    with Image.open(path) as picture:
+    with open_picture(path) as picture:
         return Image.fromarray(bytes_on_white(np.asarray(picture.convert("RGBA"))))
 
 

@@ -20,6 +20,7 @@ from charnerf.errors import CharNeRFError, DataError
 from charnerf.geometry.framing import SOURCE_ORDER, source_cameras
 from charnerf.inference.model import Model
 from charnerf.inference.weights import load
+from charnerf.pictures import open_picture
 from charnerf.reporting.document import Block, Heading, Picture, Text
 from charnerf.reporting.picture_sheet import CELL, picture_on_white, save_sheet
 from charnerf.reporting.rows import Row
@@ -203,7 +204,7 @@ def _cut_out(path: Path) -> np.ndarray:
     mask = path.with_name(f"{path.stem.removesuffix(_TEXTURE)}{_MASK}.png")
     if not mask.is_file():
         return cut_out(load_drawing(path)).rgba
-    with Image.open(path) as picture, Image.open(mask) as alpha:
+    with open_picture(path) as picture, open_picture(mask) as alpha:
         rgba = picture.convert("RGBA")
         rgba.putalpha(alpha.convert("L").resize(rgba.size))
     return cut_out(drawing_from_array(np.array(rgba), path.name)).rgba

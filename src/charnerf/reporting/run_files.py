@@ -10,6 +10,7 @@ from typing import Any
 
 from charnerf.errors import DataError
 from charnerf.evaluation.scores import METRIC_KEYS
+from charnerf.files import read_text
 
 _METRICS_KEYS = (
     *METRIC_KEYS,
@@ -43,12 +44,14 @@ def read_metrics(path: Path) -> dict[str, Any]:
         DataError: If it is missing, no JSON, or lacks the metrics.
     """
     try:
-        metrics = json.loads(path.read_text(encoding="utf-8"))
+        metrics = json.loads(read_text(path))
+    except DataError:
+        raise
     except FileNotFoundError as error:
         raise DataError(
             f"{path}: no such file, expected a finished evaluation; run `charnerf evaluate`."
         ) from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise DataError(f"{path}: is not readable JSON ({error}); run `charnerf evaluate` again.") from error
     missing = [key for key in _METRICS_KEYS if not isinstance(metrics, dict) or key not in metrics]
     if missing:
@@ -62,15 +65,27 @@ def read_curve(path: Path) -> Curve:
     Raises:
         DataError: If the file has no column `seconds`.
     """
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        if "seconds" not in (reader.fieldnames or ()):
-            columns = ", ".join(reader.fieldnames or ()) or "none"
-            raise DataError(
-                f"{path}: found the columns {columns}, expected `seconds` among "
-                "them; the run's curve.csv is another file or was cut off."
-            )
-        return [_finite_cells(row) for row in reader]
+    names, rows = _read_table(path)
+    if "seconds" not in names:
+        columns = ", ".join(names)[:200] or "none"
+        raise DataError(
+            f"{path}: found the columns {columns}, expected `seconds` among "
+            "them; the run's curve.csv is another file or was cut off."
+        )
+    return [_finite_cells(row) for row in rows]
+
+
+def _read_table(path: Path) -> tuple[list[str], list[dict[str, Any]]]:
+    """Names of a CSV file's first line, and rows by them.
+
+    Raises:
+        DataError: If it can not be read.
+    """
+    try:
+        reader = csv.DictReader(read_text(path).splitlines())
+        return [str(name) for name in reader.fieldnames or ()], list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DataError(f"{path}: can not be read ({error}), expected a table that a run wrote.") from error
 
 
 def _finite_cells(row: Mapping[str, Any]) -> dict[str, float]:
@@ -99,9 +114,10 @@ def read_views(path: Path) -> list[View]:
         DataError: If it is unreadable or not such a table.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return [_view(row) for row in csv.DictReader(file)]
-    except (OSError, UnicodeDecodeError, csv.Error, KeyError, ValueError, TypeError) as error:
+        return [_view(row) for row in _read_table(path)[1]]
+    except DataError:
+        raise
+    except (KeyError, ValueError, TypeError) as error:
         raise DataError(
             f"{path}: can not be read ({type(error).__name__}: {error}), expected the table of views that an "
             "evaluation wrote; run `charnerf evaluate` again."

@@ -8,11 +8,13 @@ that the axes are the world's (Z up, facing -Y), where most programs take OBJ as
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from PIL import Image
 
 from charnerf.errors import DataError
+from charnerf.files import inside, open_regular
+from charnerf.pictures import open_picture
 from charnerf.surfaces.color import linear_from_srgb, srgb_from_linear
+from charnerf.surfaces.foreign_files import load_file
 from charnerf.surfaces.scene_mesh import COLORS_KEY, placed_meshes, surface_of_scene
 from charnerf.surfaces.surface_mesh import CUTOFF, SurfaceMaterial, SurfaceMesh, Texture, make_texture
 
@@ -58,8 +60,8 @@ def load_surface_mesh(mesh_file: str | Path) -> SurfaceMesh:
             f"{mesh_file}: no such file; capture the character again, or train without its surface."
         )
     try:
-        with mesh_file.open(encoding="utf-8", errors="replace") as file:
-            ours = file.readline() == _HEADER
+        with open_regular(mesh_file) as file:
+            ours = file.readline(len(_HEADER) + 1) == _HEADER.encode()
         mesh = _read_ours(mesh_file) if ours else _read_foreign(mesh_file)
     except DataError:
         raise
@@ -123,7 +125,7 @@ def _read_ours(mesh_file: Path) -> SurfaceMesh:
     lines = mesh_file.read_text(encoding="ascii").splitlines()
     vertices = _numbers([line[2:] for line in lines if line.startswith("v ")], 6)
     uvs = _numbers([line[3:] for line in lines if line.startswith("vt ")], 2)
-    by_name = _read_materials(mesh_file.with_suffix(".mtl"))
+    by_name = _read_materials(inside(mesh_file.parent, mesh_file.with_suffix(".mtl").name, str(mesh_file)))
     faces, names, counts = [], [], []
     for line in lines:
         if line.startswith("usemtl "):
@@ -179,7 +181,7 @@ def _read_material(file: Path, entry: dict[str, str], textures: dict[str, Textur
     if picture is None:
         return SurfaceMaterial(factor=factor, cutoff=CUTOFF if hidden else None)
     if picture not in textures:
-        with Image.open(file.with_name(picture)) as image:
+        with open_picture(inside(file.parent, picture, str(file))) as image:
             textures[picture] = make_texture(np.array(image.convert("RGBA")))
     return SurfaceMaterial(
         factor=factor, texture=textures[picture], cutoff=CUTOFF if "map_d" in entry else None
@@ -187,7 +189,7 @@ def _read_material(file: Path, entry: dict[str, str], textures: dict[str, Textur
 
 
 def _read_foreign(mesh_file: Path) -> SurfaceMesh:
-    scene = trimesh.load_scene(mesh_file, process=False)
+    scene = load_file(mesh_file)
     for mesh in scene.geometry.values():
         mesh.metadata[COLORS_KEY] = "srgb"
     if not placed_meshes(scene):
