@@ -182,7 +182,7 @@ def _partner(azimuths_deg: Sequence[float], index: int, level: np.ndarray) -> in
 
 def _allowed(outlines: Sequence[np.ndarray], azimuths_deg: Sequence[float], level: np.ndarray) -> np.ndarray:
     """Tolerances (V, SIDE) of all views; one from above or below carves where the level ones agree, else not at all."""
-    rows = np.flatnonzero(level)
+    rows = np.flatnonzero(level).tolist()
     found = np.full((len(outlines), SIDE), TOLERANCES[0])
     if len(rows) > 1:
         found[rows] = tolerances([outlines[i] for i in rows], [azimuths_deg[i] for i in rows])
