@@ -7,8 +7,8 @@ import trimesh
 
 from charnerf.errors import ConfigError, DataError
 from charnerf.geometry.world import HEIGHT
-from charnerf.surfaces.foreign_files import gltf_header, load_file
-from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY, placed_meshes
+from charnerf.surfaces.scene_files import read_scene
+from charnerf.surfaces.scene_mesh import placed_meshes
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 _DEFAULT_AXES = {
@@ -34,8 +34,8 @@ def load_scene(path: str | Path, up: str | None = None, facing: str | None = Non
         A scene whose graph carries the change of frame; colours as surfaces/scene_mesh.py reads them.
 
     Raises:
-        DataError: If the file is missing, of another format, unreadable, without faces, or has vertices that
-            are not finite.
+        DataError: If the file is missing, of another format, unreadable (surfaces/scene_files.py), without faces, or has
+            vertices that are not finite.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -46,15 +46,7 @@ def load_scene(path: str | Path, up: str | None = None, facing: str | None = Non
     if not path.is_file():
         raise DataError(f"{path}: no such file, expected a mesh.")
     rotation = axes_rotation(*file_axes(suffix, up, facing))
-    try:
-        scene = load_file(path)
-    except (MemoryError, KeyboardInterrupt, DataError):
-        raise
-    except Exception as err:  # trimesh's readers raise every kind
-        raise DataError(
-            f"{path}: can not be read as a mesh ({type(err).__name__}: {err}); export it again."
-        ) from err
-    _note_colors(scene, path)
+    scene = read_scene(path)
     _check_geometry(scene, path)
     return to_world(scene, rotation, where=str(path))
 
@@ -146,25 +138,3 @@ def _check_geometry(scene: trimesh.Scene, path: Path) -> None:
                 f"{path}: {name}: found {bad} of {len(vertices)} vertices not finite (NaN or infinity), "
                 "expected numbers; repair the mesh."
             )
-
-
-def _note_colors(scene: trimesh.Scene, path: Path) -> None:
-    """Mark sRGB vertex colours, and keep glTF's colour factors in full."""
-    suffix = path.suffix.lower()
-    if suffix not in (".glb", ".gltf"):
-        for mesh in scene.geometry.values():
-            mesh.metadata[COLORS_KEY] = "srgb"
-        return
-    factors: dict[str, list[np.ndarray]] = {}
-    for material in gltf_header(path).get("materials", []):
-        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
-        if factor is not None:
-            factors.setdefault(material.get("name"), []).append(np.array(factor, dtype=np.float64))
-    for mesh in scene.geometry.values():
-        kept = getattr(getattr(mesh.visual, "material", None), "baseColorFactor", None)
-        if kept is None:
-            continue
-        for factor in factors.get(mesh.visual.material.name, []):
-            if np.abs(factor * 255.0 - kept).max() <= 1.0:
-                mesh.metadata[FACTOR_KEY] = factor.tolist()
-                break

@@ -1,13 +1,11 @@
-"""Mesh files of others by trimesh, held to their own folder, to ordinary pictures and to sizes that fit."""
+"""What holds mesh files of others to their own folder, to ordinary pictures and to sizes that fit."""
 
-import json
-import os
-import struct
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import trimesh
 from PIL import Image
@@ -36,14 +34,15 @@ class OwnFolder(trimesh.resolvers.FilePathResolver):
         self._file, self._refused = file, refused
 
     def get(self, name: str) -> bytes:
-        """Content of a file by the name that the mesh file has for it, or of one with its last name beside it.
+        """Content of a file by the name, or the URI, that the mesh file has for it, or of one with its last name beside it.
 
         Raises:
             FileNotFoundError: If there is none.
             DataError: If it lies elsewhere, or is no file.
         """
         name, problem = name.strip(), None
-        for one in (name, name.lstrip("/"), name.replace("\\", "/").split("/")[-1]):
+        decoded = unquote(name).replace("\\", "/")
+        for one in (name, name.lstrip("/"), decoded, decoded.split("/")[-1]):
             try:
                 path = inside(self._file.parent, one, str(self._file))
                 if one and path.exists():
@@ -54,52 +53,6 @@ class OwnFolder(trimesh.resolvers.FilePathResolver):
             self._refused.append(str(problem))
             raise problem
         raise FileNotFoundError(name)
-
-
-def load_file(file: Path) -> trimesh.Scene:
-    """Read a mesh file by trimesh; nothing outside its folder is read, and no picture but of `pictures.FORMATS`.
-
-    Raises:
-        DataError: If it is no file, names files elsewhere, or is too large, as are pictures in it.
-        Exception: Of any kind, as trimesh's readers raise them.
-    """
-    refused: list[str] = []
-    suffix = file.suffix.lower()
-    with open_regular(file) as stream:
-        if os.fstat(stream.fileno()).st_size > MOST_BYTES:
-            raise DataError(f"{file}: found more than {MOST_BYTES} bytes, expected fewer; split the mesh.")
-        if suffix in (".glb", ".gltf"):
-            check_gltf(gltf_header(file), file)
-        with _pictures_checked(str(file), refused):
-            scene = trimesh.load_scene(
-                stream, file_type=suffix.lstrip("."), resolver=OwnFolder(file, refused), process=False
-            )
-    if refused:
-        raise DataError(refused[0])
-    return scene
-
-
-def gltf_header(file: Path) -> dict[str, Any]:
-    """The JSON of a glTF or GLB file.
-
-    Raises:
-        DataError: If it can not be read.
-    """
-    try:
-        content = read_whole(file)
-        if content[:4] == b"glTF":
-            (length,) = struct.unpack_from("<I", content, 12)
-            content = content[20 : 20 + length]
-        header = json.loads(content)
-    except (ValueError, RecursionError, struct.error) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(
-            f"{file}: can not be read as a mesh ({type(error).__name__}: {error}); export it again."
-        ) from error
-    if not isinstance(header, dict):
-        raise DataError(f"{file}: can not be read as a mesh (no glTF object); export it again.")
-    return header
 
 
 def check_gltf(header: dict[str, Any], file: Path) -> None:
@@ -152,7 +105,7 @@ def read_whole(file: Path) -> bytes:
 
 
 @contextmanager
-def _pictures_checked(name: str, refused: list[str]) -> Iterator[None]:
+def pictures_checked(name: str, refused: list[str]) -> Iterator[None]:
     """Within, Pillow opens for trimesh what we would: trimesh calls it with any bytes of a file, and passes over errors."""
     opened = 0
 

@@ -14,8 +14,8 @@ from charnerf.errors import DataError
 from charnerf.files import inside, open_regular
 from charnerf.pictures import open_picture
 from charnerf.surfaces.color import linear_from_srgb, srgb_from_linear
-from charnerf.surfaces.foreign_files import load_file
-from charnerf.surfaces.scene_mesh import COLORS_KEY, placed_meshes, surface_of_scene
+from charnerf.surfaces.scene_files import read_scene
+from charnerf.surfaces.scene_mesh import placed_meshes, surface_of_scene
 from charnerf.surfaces.surface_mesh import CUTOFF, SurfaceMaterial, SurfaceMesh, Texture, make_texture
 
 _HEADER = "# charnerf mesh 1: metres, +Z up, facing -Y; v x y z r g b with sRGB colours\n"
@@ -189,9 +189,7 @@ def _read_material(file: Path, entry: dict[str, str], textures: dict[str, Textur
 
 
 def _read_foreign(mesh_file: Path) -> SurfaceMesh:
-    scene = load_file(mesh_file)
-    for mesh in scene.geometry.values():
-        mesh.metadata[COLORS_KEY] = "srgb"
+    scene = read_scene(mesh_file)
     if not placed_meshes(scene):
         raise DataError(f"{mesh_file}: found no faces, expected triangles; capture the character again.")
     return surface_of_scene(scene)

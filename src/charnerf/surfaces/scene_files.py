@@ -1,0 +1,115 @@
+"""Mesh files of other programs to scenes in their own axes, with colours as surfaces/scene_mesh.py reads them."""
+
+import io
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual.material import MultiMaterial
+
+from charnerf.errors import DataError
+from charnerf.surfaces.foreign_files import OwnFolder, pictures_checked, read_whole
+from charnerf.surfaces.gltf_document import GltfDocument, read_gltf
+from charnerf.surfaces.plain_gltf import make_plain
+from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY
+
+
+def read_scene(path: Path) -> trimesh.Scene:
+    """Read a mesh file; nothing outside its folder is opened.
+
+    Args:
+        path: GLB, glTF, OBJ, PLY, STL, or what else trimesh reads.
+
+    Raises:
+        DataError: If it can not be read, needs what is not supported, or names a file or picture that is missing or broken.
+    """
+    try:
+        scene = _read_scene(path)
+        _load_pictures(scene)
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except DataError as err:
+        message = str(err)  # those of guards say it already
+        raise DataError(message if message.startswith(f"{path}:") else f"{path}: {message}") from err
+    except Exception as err:  # readers raise every kind
+        raise DataError(
+            f"{path}: can not be read as a mesh ({type(err).__name__}: {err}); export it again."
+        ) from err
+    return scene
+
+
+def _read_scene(path: Path) -> trimesh.Scene:
+    suffix, refused = path.suffix.lower(), list[str]()
+    folder = OwnFolder(path, refused)
+    if suffix in (".glb", ".gltf"):
+        document = read_gltf(path, partial(_neighbour, folder))
+        make_plain(document, partial(_neighbour, folder))
+        content, suffix = document.to_glb(), ".glb"
+    else:
+        document, content = None, read_whole(path)
+    with pictures_checked(str(path), refused):
+        scene = trimesh.load_scene(
+            io.BytesIO(content), file_type=suffix.lstrip("."), resolver=folder, process=False
+        )
+    if refused:
+        raise DataError(refused[0])
+    if document is not None:
+        _keep_factors(scene, document)
+        return scene
+    for mesh in scene.geometry.values():
+        mesh.metadata[COLORS_KEY] = "srgb"
+    return scene
+
+
+def _neighbour(folder: OwnFolder, name: str) -> bytes:
+    """Content of a file that the mesh names.
+
+    Raises:
+        DataError: If it is missing or lies outside the mesh's folder.
+    """
+    try:
+        return folder.get(name)
+    except FileNotFoundError as err:
+        raise DataError(
+            f"names {name}, which is not in its folder; put it there, or export the mesh again."
+        ) from err
+
+
+def _keep_factors(scene: trimesh.Scene, document: GltfDocument) -> None:
+    """Keep glTF's colour factors in full."""
+    factors: dict[str, list[np.ndarray]] = {}
+    for material in document.tree.get("materials", []):
+        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
+        if factor is not None:
+            factors.setdefault(material.get("name"), []).append(np.array(factor, dtype=np.float64))
+    for mesh in scene.geometry.values():
+        kept = getattr(getattr(mesh.visual, "material", None), "baseColorFactor", None)
+        if kept is None:
+            continue
+        for factor in factors.get(mesh.visual.material.name, []):
+            if np.abs(factor * 255.0 - kept).max() <= 1.0:
+                mesh.metadata[FACTOR_KEY] = factor.tolist()
+                break
+
+
+def _load_pictures(scene: trimesh.Scene) -> None:
+    """Decode the pictures of base colours, which are read lazily else.
+
+    Raises:
+        DataError: If one is broken.
+    """
+    for mesh in scene.geometry.values():
+        material = getattr(mesh.visual, "material", None)
+        for each in material.materials if isinstance(material, MultiMaterial) else [material]:
+            picture = getattr(each, "baseColorTexture", None) or getattr(each, "image", None)
+            if picture is None:
+                continue
+            try:
+                picture.load()
+            except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as err:
+                name = getattr(each, "name", None)
+                raise DataError(
+                    f"the picture of material {name!r} can not be read ({err}); export it again."
+                ) from err
