@@ -78,7 +78,7 @@ def test_report_has_ours_beside_the_papers(grid):
     assert lines[3].startswith("| charnerf | 1 |") and "| 34.3 |" in lines[3]
     assert any(line.startswith("| visual hull") for line in lines)
     assert "| no_mha | 1,234 | 25 s | 90 |" in text
-    assert "bad: failed: NumericalError: <nan>" in text
+    assert "bad: failed: NumericalError: &lt;nan>" in text
     assert "View attention does not clearly earn its place here" in text
     links = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
     assert {"report_curves.png", "report_azimuth.png", "report_distance.png", "report_matrix.png"} == set(

@@ -72,6 +72,11 @@ def main() -> None:
     sys.exit(run(sys.argv[1:]))
 
 
+def _printable(text: str) -> str:
+    """A message as every terminal can show it: half characters and control signs, as names of files hold them, escaped."""
+    return "".join(one if one.isprintable() or one in "\n\t" else ascii(one)[1:-1] for one in text)
+
+
 def run(arguments: list[str]) -> int:
     """Run a command line and return its exit status."""
     debug = "--debug" in arguments
@@ -86,9 +91,12 @@ def run(arguments: list[str]) -> int:
         app(arguments, prog_name="charnerf", obj=debug)
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else FAILED if leaving.code else 0
-    except (CharNeRFError, OSError, MemoryError) as error:
+    except Exception as error:
         if debug:
             traceback.print_exc()
-        typer.echo(f"error: {error}", err=True)
+        is_ours = isinstance(error, CharNeRFError | OSError)
+        kind = "" if is_ours else f"{type(error).__name__}: "
+        hint = "" if is_ours or debug else " (--debug shows where)"
+        typer.echo(f"error: {kind}{_printable(str(error))}{hint}", err=True)
         return WRONG_CALL if isinstance(error, ConfigError) else FAILED
     return 0

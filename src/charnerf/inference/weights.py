@@ -194,7 +194,14 @@ def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
     """Config from the run folder that the checkpoint lies in, weights from the checkpoint."""
     try:
         content = torch.load(file, map_location="cpu", weights_only=True)
-        state = content["state_dict"]
+        prefix = "model."
+        state = {
+            name.removeprefix(prefix): value
+            for name, value in content["state_dict"].items()
+            if name.startswith(prefix)
+        }
+        if not all(isinstance(value, Tensor) for value in state.values()):
+            raise TypeError("its state_dict holds other things than tensors")
     except Exception as error:  # torch raises many kinds on files that are no checkpoints
         raise DataError(
             f"{file}: can not be read as a checkpoint ({' '.join(str(error).split())[:200]}), expected one"
@@ -206,6 +213,4 @@ def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
             f"{file}: no config.yaml beside it or in {file.parent.parent}; keep checkpoints in their run"
             " folder."
         )
-    prefix = "model."
-    cfg = load_config(folder, MODEL_SECTIONS)
-    return cfg, {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
+    return load_config(folder, MODEL_SECTIONS), state

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from charnerf.files import write_text
-from charnerf.markdown import table
+from charnerf.markdown import code_block, escaped, table
 from charnerf.pictures import open_picture
 
 STILL = (
@@ -110,23 +110,23 @@ def _markdown(block: Block, folder: Path) -> str:
 
 @_markdown.register
 def _(block: Heading, folder: Path) -> str:
-    return f"{'#' * block.level} {block.text}"
+    return f"{'#' * block.level} {escaped(block.text)}"
 
 
 @_markdown.register
 def _(block: Text, folder: Path) -> str:
-    return block.text
+    return block.text.replace("<", "&lt;")
 
 
 @_markdown.register
 def _(block: Bullets, folder: Path) -> str:
-    return "\n".join(f"- {item}" for item in block.items)
+    return "\n".join(f"- {escaped(item)}" for item in block.items)
 
 
 @_markdown.register
 def _(block: Code, folder: Path) -> str:
     title = f"{block.folded}:\n\n" if block.folded else ""
-    return f"{title}```\n{block.text.rstrip()}\n```"
+    return title + code_block(block.text)
 
 
 @_markdown.register
@@ -137,7 +137,8 @@ def _(block: Table, folder: Path) -> str:
 @_markdown.register
 def _(block: Picture, folder: Path) -> str:
     link = block.path.relative_to(folder).as_posix().replace(" ", "%20")
-    return f"![{block.caption}]({link})\n\n*{block.caption}*"
+    caption = escaped(block.caption)
+    return f"![{caption}]({link})\n\n*{caption}*"
 
 
 @_markdown.register

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from charnerf.errors import DataError
+from charnerf.files import read_text
 from charnerf.meshing.lod import PAPER
 from charnerf.reporting.document import Block, Heading, Table
 from charnerf.reporting.formats import NONE, cell, seconds_text
@@ -50,9 +51,9 @@ def _seed(row: Row, place: int) -> str:
 def _read(path: Path) -> list[dict[str, Any]]:
     """Levels of a file, finest first."""
     try:
-        levels = json.loads(path.read_text(encoding="utf-8"))
+        levels = json.loads(read_text(path))
         return [{key: level[key] for key in _KEYS} for level in levels]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataError(
             f"{path}: can not be read ({type(error).__name__}: {error}), expected what `charnerf mesh --lod` writes; remove it."
         ) from error

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from charnerf.data.layout import check_view_name
 from charnerf.errors import DataError
 from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.files import read_text
+from charnerf.reporting.metrics_shape import check_metrics
 
 _METRICS_KEYS = (
     *METRIC_KEYS,
@@ -56,6 +58,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
     missing = [key for key in _METRICS_KEYS if not isinstance(metrics, dict) or key not in metrics]
     if missing:
         raise DataError(f"{path}: lacks {', '.join(missing)}; run `charnerf evaluate` again.")
+    check_metrics(metrics, path)
     return dict(metrics)
 
 
@@ -115,8 +118,6 @@ def read_views(path: Path) -> list[View]:
     """
     try:
         return [_view(row) for row in _read_table(path)[1]]
-    except DataError:
-        raise
     except (KeyError, ValueError, TypeError) as error:
         raise DataError(
             f"{path}: can not be read ({type(error).__name__}: {error}), expected the table of views that an "
@@ -126,4 +127,8 @@ def read_views(path: Path) -> list[View]:
 
 def _view(row: dict[str, str]) -> View:
     numbers = {key: float(cell) for key, cell in row.items() if key not in _VIEW_WORDS and cell != ""}
+    if not all(abs(value) < math.inf for value in numbers.values()):
+        raise ValueError("a cell is no finite number")
+    for name in ("character", "view"):
+        check_view_name("a row", row[name])
     return View(row["method"], row["character"], row["view"], numbers)

@@ -11,6 +11,7 @@ from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import DataError
 from charnerf.evaluation.records import read_record, write_record
+from charnerf.files import read_text
 from charnerf.inference.model import Model
 from charnerf.inference.weights import load
 from charnerf.reporting.run_files import Curve, View, read_curve, read_metrics, read_views
@@ -19,6 +20,7 @@ CELL_FILE = "cell.json"  # how far a cell of a grid came; training writes it
 START_FILE = "start.txt"  # where weights began that were meant to begin pretrained; training writes it
 
 Record = TypeVar("Record")
+Content = TypeVar("Content", list, dict)
 
 
 @dataclass(frozen=True)
@@ -139,22 +141,36 @@ def _read_run(path: Path, folder: Path) -> Run:
     return Run(
         folder=path,
         name=_name(path, folder),
-        overrides=tuple(_yaml(path / ".hydra" / "overrides.yaml") or ()),
-        config=_yaml(path / "config.yaml") or {},
+        overrides=tuple(str(one) for one in _yaml(path / ".hydra" / "overrides.yaml", list)),
+        config=_yaml(path / "config.yaml", dict),
         metrics=read_metrics(path / "metrics.json"),
         curve=read_curve(curve) if curve.is_file() else [],
         views=read_views(views) if views.is_file() else None,
-        start=start.read_text(encoding="utf-8").strip() if start.is_file() else None,
+        start=_first_line(start) if start.is_file() else None,
     )
+
+
+def _first_line(path: Path) -> str:
+    try:
+        return read_text(path).strip()
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: is no text ({error}), expected where weights began; remove it.") from error
 
 
 def _name(path: Path, folder: Path) -> str:
     return path.relative_to(folder).as_posix() if path != folder else path.resolve().name
 
 
-def _yaml(path: Path) -> Any:
-    """Content of a YAML file, None where there is none."""
-    return read_yaml(path) if path.is_file() else None
+def _yaml(path: Path, kind: type[Content]) -> Content:
+    """Content of a YAML file, empty where there is none.
+
+    Raises:
+        DataError: If it can not be read, or is of another kind.
+    """
+    content = (read_yaml(path) if path.is_file() else None) or kind()
+    if not isinstance(content, kind):
+        raise DataError(f"{path}: found {str(content)[:60]!r}, expected a {kind.__name__} as a run wrote it.")
+    return content
 
 
 def _cell_state(path: Path) -> tuple[str, str]:
@@ -162,8 +178,8 @@ def _cell_state(path: Path) -> tuple[str, str]:
     if not path.is_file():
         return "no metrics.json", ""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
         state, error = str(content["state"]), str(content.get("error") or "")
-    except (OSError, ValueError, KeyError, AttributeError) as problem:
+    except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as problem:
         return "record unreadable", str(problem)
     return ("running or killed" if state == "running" else state), error

@@ -18,7 +18,7 @@ from omegaconf import DictConfig
 
 from charnerf.config.grid import config_hash
 from charnerf.errors import DataError
-from charnerf.files import write_text
+from charnerf.files import read_text, write_text
 from charnerf.training.run import run_training
 
 log = logging.getLogger(__name__)
@@ -101,8 +101,8 @@ def read_cell(folder: Path) -> Cell | None:
     if not file.is_file():
         return None
     try:
-        return Cell(name=folder.name, **json.loads(file.read_text(encoding="utf-8")))
-    except (ValueError, TypeError) as error:
+        return Cell(name=folder.name, **json.loads(read_text(file)))
+    except (ValueError, TypeError, RecursionError) as error:
         raise DataError(f"{file}: can not be read ({error}), expected a cell's state; remove it.") from error
 
 
