@@ -124,13 +124,21 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Check that a folder can be written to where a command is told to.
+    """Check that a folder can be written to where a command is told to, before the work.
 
     Raises:
-        DataError: If there is a file.
+        DataError: If there is a file, or nothing can be written there: it is read only, full, or its name too long.
     """
-    if path.exists() and not path.is_dir():
-        raise DataError(f"{path}: found a file, expected a folder to write to. Choose another.")
+    try:
+        if path.exists() and not path.is_dir():
+            raise DataError(f"{path}: found a file, expected a folder to write to. Choose another.")
+        nearest = next(one for one in (path, *path.absolute().parents) if one.is_dir())
+        with tempfile.TemporaryFile(dir=nearest) as file:
+            file.write(b"x" * 4096)
+    except OSError as error:
+        raise DataError(
+            f"{str(path)[:200]}: can not be written to ({error.strerror}), expected a folder with room. Choose another."
+        ) from error
 
 
 @contextmanager

@@ -177,6 +177,7 @@ def test_lists_of_characters_are_names(edit: Callable[[dict], object], data: Pat
         (lambda one: one["frames"][0].update(w=1e9), r"frames\[0\]\.w: found 1000000000"),
         (lambda one: one.update(w=10**9, h=10**9), r"frames\[0\]\.w: found"),
         (lambda one: one["source_views"]["front"].update(w=1e9, h=1e9), r"source_views\.front\.w: found"),
+        (lambda one: one.update(source_views={str(one): {} for one in range(3000)}), "source_views: found 3000"),
         (lambda one: one.update(fl_x=10**400), r"fl_x: found"),
         (lambda one: one["frames"][0].update(transform_matrix=[[10**400] * 4] * 4), "transform_matrix: found"),
         (lambda one: one["frames"][0].update(transform_matrix=[[]]), "transform_matrix: found"),
@@ -335,3 +336,10 @@ def test_gltf_that_never_ends_is_refused(edit: Callable[[dict], object], tmp_pat
     change(file, edit)
     with pytest.raises(DataError, match=r"model\.gltf: "):
         load_scene(file)
+
+
+@pytest.mark.parametrize("size", [(16, 20_000), (20_000, 16)])
+def test_a_thread_is_no_drawing(size: tuple[int, int], tmp_path: Path) -> None:
+    Image.new("RGB", size).save(tmp_path / "x.png")
+    with pytest.raises(DataError, match=r"x\.png: found .* expected one side at most 50 times the other"):
+        load_drawing(tmp_path / "x.png")

@@ -209,3 +209,79 @@ def test_a_folder_of_others_is_no_run(tmp_path: Path) -> None:
     (tmp_path / "weights.safetensors").mkdir()
     with pytest.raises(DataError, match="holds no weights"):
         charnerf.load(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "state",
+    [None, [1], {1: torch.zeros(1)}, {"model.x": 3}, {"model.x": [torch.zeros(1)]}, {}, {"model.x": torch.zeros(1)}, "x"],
+)  # fmt: skip
+def test_checkpoints_that_hold_no_weights_are_named(state: object, weights: Path, tmp_path: Path) -> None:
+    folder = run_of(tmp_path / "run", weights, config_of(weights))
+    for content in ({"state_dict": state}, state):
+        torch.save(content, folder / "checkpoints" / "last.ckpt")
+        with pytest.raises(DataError, match=r"last\.ckpt: "):
+            charnerf.load(folder)
+
+
+@pytest.mark.parametrize(
+    ("options", "status"),
+    [
+        *((["--lod", one], 2) for one in ("²", "9" * 5000, "1000000000", "64,", "")),
+        (["--faces", "9" * 30], 2),
+        (["--cameras", "1000000000"], 2),
+        (["--smooth", "1000000000"], 2),
+        (["--height", "nan"], 2),
+        (["--texture-size", "1000000000"], 2),
+    ],
+)
+def test_options_that_no_machine_does_are_refused_at_once(
+    options: list[str],
+    status: int,
+    weights: Path,
+    tmp_path: Path,
+    figure_dataset: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    mesh = [
+        "mesh",
+        str(weights),
+        "--data",
+        str(figure_dataset),
+        "--character",
+        "twin",
+        "-o",
+        str(tmp_path / "o"),
+    ]
+    begun = time.perf_counter()
+    assert run([*mesh, *options]) == status
+    assert time.perf_counter() - begun < 5.0
+    assert "--debug" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command", [["generate", "--train", "1000000000"], ["generate", "--views", "1000000000"]]
+)
+def test_data_sets_that_no_disk_holds_are_refused_at_once(command: list[str], tmp_path: Path) -> None:
+    assert run([*command, "-o", str(tmp_path / "o")]) == 2
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("output", ["/proc/nothing", "/proc/nothing/deep", "/tmp/" + "x" * 5000])
+def test_folders_that_can_not_be_written_to_are_named_before_the_work(
+    output: str, weights: Path, figure_dataset: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = ["--data", str(figure_dataset)]
+    for command in (
+        ["draw", *data, "--character", "twin", "-o", output],
+        ["mesh", str(weights), *data, "--character", "twin", "-o", output],
+        ["evaluate", str(weights), *data, "-o", output],
+        ["evaluate", str(weights), *data, "--json", f"{output}/x.json"],
+        ["check", str(weights), *data, "-o", output],
+        ["generate", "-o", output],
+    ):
+        begun = time.perf_counter()
+        assert run(command) == 1
+        assert (
+            f"error: {output[:100]}" in (told := capsys.readouterr().err) and "can not be written to" in told
+        )
+        assert time.perf_counter() - begun < 3.0

@@ -29,6 +29,7 @@ from charnerf.files import locked
 from charnerf.procedural import GENERATOR_VERSION, make_character
 
 SPLITS = ("train", "val", "test")
+MOST_CHARACTERS = 3_000_000  # of a data set
 _LOCK_FILE = ".generate.lock"
 
 
@@ -179,6 +180,8 @@ def _check_numbers(counts: dict[str, int], *, views: int, size: int) -> None:
     for name, value in counts.items():
         if value < 0:
             raise ConfigError(f"{name}: found {value}, expected 0 or more.")
+    if sum(counts[split] for split in SPLITS) > MOST_CHARACTERS:
+        raise ConfigError(f"train, val, test: expected at most {MOST_CHARACTERS} characters in all.")
     if sum(counts[split] for split in SPLITS) == 0:
         raise ConfigError("train, val, test: found 0 each, expected at least one character in all.")
     if views < 1 or size < 8:

@@ -44,8 +44,10 @@ def command(
     Each row compares with a reference of higher precision and has a bound; the usual formulas stand beside
     and have to fail. Exit status 1 if any bound is broken.
     """
+    from charnerf.files import check_folder
     from charnerf.stability import TrainedField, run_check
 
+    check_folder(output)
     trained = None
     if weights is not None:
         model = load_model(None if weights == "released" else Path(weights), device=device, trust=trust)

@@ -33,7 +33,9 @@ def command(
     """
     from charnerf.data.characters import load_character
     from charnerf.drawings.artist import draw_character, write_drawings
+    from charnerf.files import check_folder
 
+    check_folder(output)
     drawn = [load_character(data, name) for name in character]
     for one in drawn:
         folder = output / one.name if len(drawn) > 1 else output

@@ -11,8 +11,9 @@ import typer
 from charnerf.cli.drawings import AsDrawn
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Dataset, Device, Trusted, Weights
+from charnerf.cli.options import Dataset, Device, Trusted, Weights, is_count
 from charnerf.errors import ConfigError, DataError
+from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ def command(
     from charnerf.inference.weights import run_folder
     from charnerf.meshing.build import build_mesh
 
+    _check_folders(output, json_file)
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
     run_views, run_resolution = _measured_by(run)
@@ -120,6 +122,13 @@ def command(
     typer.echo(json.dumps(metrics, indent=2))
 
 
+def _check_folders(output: Path | None, json_file: Path | None) -> None:
+    """Check, before any work, that what is measured can be written."""
+    for folder in (output, json_file.parent if json_file else None):
+        if folder is not None:
+            check_folder(folder)
+
+
 def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None) -> None:
     """Write metrics.json and the report into the folder of predictions, and the metrics to a file."""
     from charnerf.evaluation.metrics_file import write_metrics
@@ -138,7 +147,7 @@ def _number_of_views(text: str | None) -> int | Literal["all"] | None:
         return None
     if text == "all":
         return "all"
-    if not (text.isdecimal() and text.isascii() and len(text) <= 6 and 1 <= int(text) <= MOST_VIEWS):
+    if not is_count(text, least=1, most=MOST_VIEWS):
         raise ConfigError(f"--views: found '{text[:60]}', expected a number from 1 to {MOST_VIEWS}, or all.")
     return int(text)
 
@@ -148,8 +157,8 @@ def _redrawn(text: str, size: int, *, reconciled: bool) -> "Callable[[Character]
     from charnerf.drawings.redrawn import redrawn
 
     level, _, seed = text.partition(":")
-    if not level.isdigit() or not (seed.isdigit() or not seed):
-        raise ConfigError(f"--drawn: found '{text}', expected LEVEL or LEVEL:SEED, such as 2 or 2:7.")
+    if not is_count(level) or not (is_count(seed, most=2**63) or not seed):
+        raise ConfigError(f"--drawn: found '{text[:60]}', expected LEVEL or LEVEL:SEED, such as 2 or 2:7.")
     return partial(redrawn, level=int(level), seed=int(seed or 0), size=size, reconciled=reconciled)
 
 

@@ -10,7 +10,18 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Dataset, Device, Folder, Symmetric, Trusted, Weights, gathered, mesh_options
+from charnerf.cli.options import (
+    Dataset,
+    Device,
+    Folder,
+    Symmetric,
+    Trusted,
+    Weights,
+    gathered,
+    is_count,
+    mesh_options,
+)
+from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions
 
 if TYPE_CHECKING:
@@ -86,6 +97,7 @@ def command(
     options = replace(
         mesh, resolution=grids[0] if grids else mesh.resolution, faces=counts[0] if counts else None
     )
+    check_folder(output)
     heroes = _heroes(data, character, split, symmetric, weights, device=device, trust=trust)
     if split is not None:
         _measure(heroes, options, output, split)
@@ -135,9 +147,10 @@ def _numbers(text: str | None, name: str, *, least: int) -> tuple[int, ...]:
         typer.BadParameter: If it is no such list, or a number is below the least.
     """
     parts = [] if text is None else [part.strip() for part in text.split(",")]
-    if not all(part.isdigit() and int(part) >= least for part in parts):
+    if not all(is_count(part, least=least) for part in parts):
         raise typer.BadParameter(
-            f"found '{text}', expected whole numbers from {least} on, such as 64,128.", param_hint=name
+            f"found '{(text or '')[:60]}', expected whole numbers from {least} on, such as 64,128.",
+            param_hint=name,
         )
     return tuple(int(part) for part in parts)
 

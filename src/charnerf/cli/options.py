@@ -93,6 +93,11 @@ Colors = Annotated[
 TextureSize = Annotated[int, typer.Option(help="Texels a side of the texture.")]
 
 
+def is_count(text: str, *, least: int = 0, most: int = 10**9) -> bool:
+    """Whether a text is a whole number within bounds; other scripts' digits and numbers of many digits are none."""
+    return text.isascii() and text.isdigit() and len(text) <= 20 and least <= int(text) <= most
+
+
 def gathered(**makers: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Let a command take, in place of a parameter, the options of the function that makes its value.
 

@@ -41,7 +41,7 @@ def parse_overrides(overrides: Sequence[str]) -> list[Override]:
         _check_length(one)
         try:
             parsed += parser.parse_overrides([one])
-        except HydraException as error:
+        except (HydraException, ValueError) as error:  # ValueError: a number of thousands of digits
             first = str(error).splitlines()[0]
             raise ConfigError(f"{one}: can not be read ({first}), expected key=value.") from error
     return parsed

@@ -19,6 +19,7 @@ from charnerf.errors import DataError
 from charnerf.files import inside
 from charnerf.types import Cameras
 
+MOST_SOURCES = 64  # views of a character that a model reads
 MOST_FRAMES = 10_000  # of a character
 MOST_PIXELS = 16_384  # a side
 AABB_SCALE = 4  # instant-ngp's box of 4 units holds cameras and character under its default scale and offset
@@ -124,6 +125,8 @@ def read_transforms(folder: Path) -> CharacterFiles:
             f"{where[depth_keys.index(False)]}: has no depth_file_path while others have; give all or none."
         )
     sources = _object(path, "source_views", content.get("source_views", {}))
+    if len(sources) > MOST_SOURCES:
+        raise DataError(f"{path}: source_views: found {len(sources)}, expected at most {MOST_SOURCES}.")
     for name in sources:
         check_view_name(f"{path}: source_views", name)
     source_where = [f"{path}: source_views.{name}" for name in sources]

@@ -12,6 +12,7 @@ from charnerf.errors import DataError
 from charnerf.pictures import check_pixels, open_picture
 
 SMALLEST = 16  # pixels a side
+LONGEST = 50  # sides of a picture over its other sides
 LOSSY = ("JPEG", "MPO", "WEBP", "JPEG2000", "AVIF")
 _PROFILED = ("RGB", "RGBA", "CMYK", "L")  # modes whose profile is of the pixels as they are
 WORKING = 1536  # pixels; a longer side is reduced to this at once
@@ -108,6 +109,11 @@ def _check_size(name: str, size: tuple[int, int]) -> None:
     if min(width, height) < SMALLEST:
         raise DataError(
             f"{name}: found {width} x {height} pixels, expected at least {SMALLEST} a side. Use a larger "
+            "picture."
+        )
+    if max(width, height) > LONGEST * min(width, height):
+        raise DataError(
+            f"{name}: found {width} x {height} pixels, expected one side at most {LONGEST} times the other. Crop the "
             "picture."
         )
 

@@ -41,17 +41,16 @@ class MeshOptions:
 
     def __post_init__(self) -> None:
         ranges: tuple[tuple[str, float, float], ...] = (
-            ("resolution", 16, float("inf")),
-            ("num_cameras", 1, float("inf")),
-            ("faces", 4, float("inf")),  # a closed surface has no fewer
-            ("smooth", 0, float("inf")),
+            ("resolution", 16, 2048),
+            ("num_cameras", 1, 10_000),
+            ("faces", 4, 10**9),  # a closed surface has no fewer
+            ("smooth", 0, 10_000),
             ("height", 0.001, 1e6),
             ("texture_size", 16, 8192),
         )
         for name, least, most in ranges:
             value = getattr(self, name)
             if value is not None and not least <= value <= most:
-                limits = f"at least {least:g}" if most == float("inf") else f"{least:g} to {most:g}"
-                raise ConfigError(f"{name}: found {value}, expected {limits}.")
+                raise ConfigError(f"{name}: found {value}, expected at least {least:g} and at most {most:g}.")
         if self.texture not in get_args(Texture):
             raise ConfigError(f"texture: found '{self.texture}', expected {', '.join(get_args(Texture))}.")
