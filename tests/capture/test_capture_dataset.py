@@ -1,13 +1,16 @@
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
+from charnerf.capture import dataset
 from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_dataset, capture_scene_to
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.surfaces.mesh_files import load_surface_mesh
+from support.gltf_files import Figure, png
 
 TINY = CaptureOptions(views=2, size=16)
 
@@ -38,6 +41,27 @@ def test_good_meshes_are_kept_beside_bad_ones(tmp_path):
     assert hero.images([0, 1]).shape == (2, 16, 16, 4)
     corners = load_surface_mesh(hero.mesh_file).triangles.reshape(-1, 3)
     np.testing.assert_allclose(corners.max(axis=0), (0.25, 0.25, 2.0), atol=1e-5)
+
+
+def test_one_mesh_that_fails_in_any_way_stops_no_other(tmp_path, monkeypatch):
+    """A picture that ends half-way, and one too large for the machine."""
+    noise = np.random.default_rng(1).integers(0, 256, (64, 64, 3), np.uint8)
+    Figure(png(Image.fromarray(noise))[:6000]).write(tmp_path / "a_half.glb")
+    Figure().write(tmp_path / "b_good.glb")
+    Figure().write(tmp_path / "c_huge.glb")
+    read = dataset.load_scene
+
+    def read_or_fail(file, *axes):
+        if file.stem == "c_huge":
+            raise MemoryError("80 GiB")
+        return read(file, *axes)
+
+    monkeypatch.setattr(dataset, "load_scene", read_or_fail)
+    report = capture_dataset([tmp_path], tmp_path / "set", "train", options=TINY, processes=1)
+    assert report.captured == ("b_good",)
+    half, huge = report.failed
+    assert half.startswith(str(tmp_path / "a_half.glb")) and "picture of material 'skin'" in half
+    assert huge.startswith(str(tmp_path / "c_huge.glb")) and "80 GiB" in huge
 
 
 def test_a_data_set_grows_and_refuses_names_it_has(tmp_path):

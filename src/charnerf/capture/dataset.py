@@ -256,4 +256,8 @@ def _capture_item(
         )
     except CharNeRFError as err:
         return str(err)
+    except OSError:  # of the data set's own disk, which all share: readers make DataErrors of theirs
+        raise
+    except Exception as err:  # whatever one mesh makes fail stops no other
+        return f"{item.file}: can not be captured ({type(err).__name__}: {err}); export it again."
     return None
