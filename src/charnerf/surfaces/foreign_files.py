@@ -1,7 +1,7 @@
 """What holds mesh files of others to their own folder, to ordinary pictures and to sizes that fit."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from PIL import Image
 
 from charnerf.errors import DataError
 from charnerf.files import inside, open_regular
-from charnerf.pictures import check_pixels, readable_formats
+from charnerf.pictures import check_pixels, open_picture, readable_formats
 
 MOST_BYTES = 2**30  # of a file, or of one that it names
 MOST_VALUES = 2**28  # numbers of a glTF accessor
@@ -27,11 +27,12 @@ class OwnFolder(trimesh.resolvers.FilePathResolver):
     Args:
         file: The mesh file.
         refused: Takes why a file was refused.
+        contents: What is given in place of files, by their names.
     """
 
-    def __init__(self, file: Path, refused: list[str]) -> None:
+    def __init__(self, file: Path, refused: list[str], contents: Mapping[str, bytes] | None = None) -> None:
         super().__init__(str(file.resolve()))
-        self._file, self._refused = file, refused
+        self._file, self._refused, self._contents = file, refused, contents or {}
 
     def get(self, name: str) -> bytes:
         """Content of a file by the name, or the URI, that the mesh file has for it, or of one with its last name beside it.
@@ -41,6 +42,8 @@ class OwnFolder(trimesh.resolvers.FilePathResolver):
             DataError: If it lies elsewhere, or is no file.
         """
         name, problem = name.strip(), None
+        if name in self._contents:
+            return self._contents[name]
         decoded = unquote(name).replace("\\", "/")
         for one in (name, name.lstrip("/"), decoded, decoded.split("/")[-1]):
             try:
@@ -102,6 +105,19 @@ def read_whole(file: Path) -> bytes:
     if len(content) > MOST_BYTES:
         raise DataError(f"{file}: found more than {MOST_BYTES} bytes, expected fewer.")
     return content
+
+
+def check_picture(content: bytes, name: str) -> None:
+    """Check that a mesh's picture is one, as far as its header says.
+
+    Raises:
+        DataError: If it can not be opened, or has too many pixels.
+    """
+    try:
+        with open_picture(content, f"picture {name}"):
+            pass
+    except OSError as err:
+        raise DataError(f"picture {name}: can not be read, expected PNG or JPEG; export it again.") from err
 
 
 @contextmanager

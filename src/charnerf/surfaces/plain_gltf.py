@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from charnerf.errors import DataError
-from charnerf.pictures import open_picture
+from charnerf.surfaces.foreign_files import check_picture
 from charnerf.surfaces.gltf_document import FLOAT, GltfDocument, uri_bytes
 from charnerf.surfaces.gltf_poses import pose_meshes
 
@@ -153,13 +153,7 @@ def _embed_pictures(document: GltfDocument, neighbour: Callable[[str], bytes]) -
         name = (
             uri if uri is not None and not uri.startswith("data:") else image.get("name", f"number {index}")
         )
-        try:
-            with open_picture(document.bytes_of_view(image["bufferView"]), f"picture {name}"):
-                pass
-        except OSError as err:
-            raise DataError(
-                f"picture {name}: can not be read, expected PNG or JPEG; export it again."
-            ) from err
+        check_picture(document.bytes_of_view(image["bufferView"]), name)
 
 
 def _source(texture: dict[str, Any]) -> int:

@@ -10,6 +10,7 @@ from PIL import Image
 from trimesh.visual.material import MultiMaterial
 
 from charnerf.errors import DataError
+from charnerf.surfaces import plain_obj, plain_ply
 from charnerf.surfaces.foreign_files import OwnFolder, pictures_checked, read_whole
 from charnerf.surfaces.gltf_document import GltfDocument, read_gltf
 from charnerf.surfaces.plain_gltf import make_plain
@@ -41,14 +42,21 @@ def read_scene(path: Path) -> trimesh.Scene:
 
 
 def _read_scene(path: Path) -> trimesh.Scene:
-    suffix, refused = path.suffix.lower(), list[str]()
+    suffix, refused, document = path.suffix.lower(), list[str](), None
     folder = OwnFolder(path, refused)
+    neighbour = partial(_neighbour, folder)
     if suffix in (".glb", ".gltf"):
-        document = read_gltf(path, partial(_neighbour, folder))
-        make_plain(document, partial(_neighbour, folder))
+        document = read_gltf(path, neighbour)
+        make_plain(document, neighbour)
         content, suffix = document.to_glb(), ".glb"
     else:
-        document, content = None, read_whole(path)
+        content = read_whole(path)
+    if suffix == ".obj":
+        folder = OwnFolder(path, refused, plain_obj.used_materials(content, neighbour))
+        content = plain_obj.plain_faces(content)
+    elif suffix == ".ply":
+        plain_ply.check_texture(content, neighbour)
+        content = plain_ply.plain_faces(content)
     with pictures_checked(str(path), refused):
         scene = trimesh.load_scene(
             io.BytesIO(content), file_type=suffix.lstrip("."), resolver=folder, process=False
