@@ -82,7 +82,7 @@ class Figure:
     def write(self, file, *, buffer_uri=None):
         """Write it as GLB, or as glTF whose buffer is at a URI; returns the file."""
         tree = copy.deepcopy(self.tree)
-        tree["buffers"] = [{"byteLength": len(self.chunk)}]
+        tree["buffers"] = [{"byteLength": len(self.chunk)}, *tree.get("buffers", [])]
         if buffer_uri is not None:
             tree["buffers"][0]["uri"] = buffer_uri
             file.write_text(json.dumps(tree))

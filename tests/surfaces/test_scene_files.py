@@ -224,7 +224,15 @@ def _draco(figure):
 
 
 def _meshopt(figure):
-    figure.tree["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {"buffer": 0}}
+    """As gltfpack writes it: the plain bytes are nowhere."""
+    figure.tree["buffers"] = [
+        {"byteLength": 96, "extensions": {"EXT_meshopt_compression": {"fallback": True}}}
+    ]
+    figure.tree["bufferViews"][0] |= {"buffer": 1, "extensions": {"EXT_meshopt_compression": {"buffer": 0}}}
+
+
+def _no_uvs(figure):
+    del figure.primitive["attributes"]["TEXCOORD_0"]
 
 
 def _basisu(figure):
@@ -274,6 +282,7 @@ def _far_joint(figure):
         (_draco, "KHR_draco_mesh_compression"),
         (_meshopt, "EXT_meshopt_compression"),
         (_basisu, "KHR_texture_basisu"),
+        (_no_uvs, "reads its picture at TEXCOORD_0"),
         (_instances, "EXT_mesh_gpu_instancing"),
         (_no_picture, "gone.png"),
         (_broken_picture, "picture face: can not be read"),
@@ -300,5 +309,6 @@ def test_optional_compression_with_plain_data_beside_it_is_read(tmp_path):
     figure.primitive["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}}
     figure.tree["textures"][0]["extensions"] = {"KHR_texture_basisu": {"source": 7}}
     figure.tree["images"].append({"uri": "unused.png"})
+    figure.tree["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {"buffer": 0}}
     plain = seen(Figure().write(tmp_path / "plain.glb"))
     np.testing.assert_array_equal(seen(figure.write(tmp_path / "other.glb")), plain)

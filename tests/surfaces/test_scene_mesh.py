@@ -34,3 +34,9 @@ def test_vertex_and_face_colors_mean_what_their_file_means(encoding, light):
         surface = surface_of_scene(mesh)
         np.testing.assert_allclose(surface.colors[..., :3], light, atol=1e-6)
         assert (surface.colors[..., 3] == 1.0).all()
+
+
+def test_grey_of_sixteen_bits_is_not_clipped():
+    quad = textured_quad(np.full((2, 2), 128 * 257, np.uint16))
+    texture = surface_of_scene(quad).materials[0].texture
+    assert texture is not None and (texture.pixels == (128, 128, 128, 255)).all()

@@ -57,13 +57,12 @@ def _refuse_extensions(tree: dict[str, Any]) -> None:
     accepted = {*HONOURED, *WITHOUT_EFFECT}
     required = tree.get("extensionsRequired", [])
     unknown = [name for name in required if name not in accepted and not name.startswith("KHR_materials_")]
-    accessors, views = tree.get("accessors", []), tree.get("bufferViews", [])
+    accessors = tree.get("accessors", [])
     for mesh in tree.get("meshes", []):
         for primitive in mesh["primitives"]:
             position = accessors[primitive["attributes"]["POSITION"]]
             if "bufferView" not in position and "sparse" not in position:
                 unknown += primitive.get("extensions", {})
-    unknown += [name for view in views for name in view.get("extensions", {}) if "meshopt" in name]
     unknown += [_INSTANCING for node in tree.get("nodes", []) if _INSTANCING in node.get("extensions", {})]
     if unknown:
         names = ", ".join(sorted(set(unknown)))
@@ -109,7 +108,7 @@ def _place_texture(document: GltfDocument, attributes: dict[str, int], texture: 
     """Move the coordinates that the base colour is read at into TEXCOORD_0, transformed."""
     transform = texture.get("extensions", {}).get(_TRANSFORM, {})
     name = f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}"
-    if texture and name not in attributes and name != "TEXCOORD_0":
+    if texture and name not in attributes:
         raise DataError(f"a material reads its picture at {name}, which the mesh has not; export it again.")
     if name not in attributes:
         return

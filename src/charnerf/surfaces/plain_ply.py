@@ -20,6 +20,7 @@ _TYPES = {
     **dict.fromkeys(("short", "int16"), "i2"), **dict.fromkeys(("ushort", "uint16"), "u2"),
     **dict.fromkeys(("int", "int32"), "i4"), **dict.fromkeys(("uint", "uint32"), "u4"),
     **dict.fromkeys(("float", "float32"), "f4"), **dict.fromkeys(("double", "float64"), "f8"),
+    "int64": "i8", "uint64": "u8", "float16": "f2",
 }  # fmt: skip
 _CORNERS = ("vertex_indices", "vertex_index")
 

@@ -157,5 +157,12 @@ def _texture(picture: Image.Image | None, textures: dict[int, Texture]) -> Textu
     if picture is None:
         return None
     if id(picture) not in textures:
-        textures[id(picture)] = make_texture(np.array(picture.convert("RGBA")))
+        textures[id(picture)] = make_texture(_rgba(picture))
     return textures[id(picture)]
+
+
+def _rgba(picture: Image.Image) -> np.ndarray:
+    """Pixels (h, w, 4), uint8."""
+    if picture.mode.startswith("I"):  # 16 bits of grey, which Pillow would clip at 255
+        picture = Image.fromarray((np.asarray(picture) / 257.0 + 0.5).astype(np.uint8))
+    return np.array(picture.convert("RGBA"))
