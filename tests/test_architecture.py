@@ -15,7 +15,7 @@ MAX_LINES = 400
 MAX_FUNCTION_LINES = 50
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
-    ("errors",),
+    ("errors", "interruption"),
     ("types", "checks", "schedule", "files", "markdown"),
     ("pictures",),
     ("process",),
@@ -48,6 +48,7 @@ ONLY_IN = {  # foreign package: where it may be imported
         "training/start",
         "training/finish",
         "training/cells",
+        "training/identity",
     ),
     "lightning": ("training", "data/datamodule"),
     "typer": ("cli",),

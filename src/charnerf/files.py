@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from charnerf.errors import DataError
+from charnerf.interruption import held
 
 MOST_TEXT = 64 * 2**20  # bytes of a file that is read whole, such as JSON
 
@@ -95,6 +96,28 @@ def write_aside(path: Path) -> Iterator[Path]:
         aside.unlink(missing_ok=True)
 
 
+def write_synced(path: Path, content: bytes) -> None:
+    """Write a file and wait until it is on the disk: a rename after this survives a power cut with its content."""
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def sync_folder(path: Path) -> None:
+    """Wait until the renames in a folder are on the disk, where the system can tell."""
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
+        return
+    try:
+        os.fsync(handle)
+    except OSError:  # some network file systems sync no folders
+        pass
+    finally:
+        os.close(handle)
+
+
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """Hold a folder, or a file that is made for it, against other processes; the system frees the lock of a killed one."""
@@ -158,12 +181,13 @@ def write_folder_aside(path: Path) -> Iterator[Path]:
     aside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
     try:
         yield aside
-        if path.exists():
-            for piece in sorted(aside.iterdir()):
-                _replace(piece, path / piece.name)
-        else:
-            aside.chmod(0o755)
-            aside.rename(path)
+        with held():
+            if path.exists():
+                for piece in sorted(aside.iterdir()):
+                    _replace(piece, path / piece.name)
+            else:
+                aside.chmod(0o755)
+                aside.rename(path)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 

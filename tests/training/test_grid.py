@@ -14,6 +14,7 @@ import torch
 
 from charnerf.training import trainer
 from charnerf.training.cells import read_cell, run_cell
+from charnerf.training.checkpoint import find_checkpoint
 from support import small_runs
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,7 +63,7 @@ def test_a_cell_killed_in_the_middle_ends_as_the_one_that_was_not(figure_dataset
     resumed: list[small_runs.SmallRun] = []
 
     def train(cfg, folder):
-        resumed.append(small_runs.assemble(cfg, folder).fit(Path(cfg.ckpt_path)))
+        resumed.append(small_runs.assemble(cfg, folder).fit(find_checkpoint(cfg.ckpt_path, folder)))
 
     assert run_cell(cfg, grid, name="cell", job_folder=grid, train=train).state == "done"
     assert [batch[0] for batch in resumed[0].recorder.batches] == list(range(done, 24))

@@ -16,6 +16,7 @@ from charnerf.data.sampler import BatchRequest, PhaseSampler
 from charnerf.data.store import CharacterStore, SurfaceOf
 from charnerf.data.validation import ValidationDataset, ValidationView
 from charnerf.errors import CharNeRFError, ConfigError
+from charnerf.interruption import leave_signals_to_parent
 from charnerf.types import Hull, SourceViews, TrainBatch
 
 
@@ -86,6 +87,7 @@ class MixedDataModule(L.LightningDataModule):
             num_workers=workers,
             persistent_workers=workers > 0,  # their characters stay open from one epoch to the next
             multiprocessing_context="fork" if workers else None,
+            worker_init_fn=_begin_worker,
             pin_memory=on_gpu,
         )
 
@@ -116,6 +118,11 @@ class _ErrorsAsItems(Dataset[TrainBatch | CharNeRFError]):
 
 def _can_fork() -> bool:
     return "fork" in multiprocessing.get_all_start_methods()
+
+
+def _begin_worker(_: int) -> None:
+    """The trainer answers signals, and ends its workers once it has no more use for their batches."""
+    leave_signals_to_parent()
 
 
 def _as_is(item: object) -> object:

@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 
 from charnerf.data.characters import read_rgba
-from charnerf.data.layout import names_of, read_dataset
+from charnerf.data.layout import TRANSFORMS_FILE, names_of, read_dataset
 from charnerf.data.transforms import read_transforms
 
 DIGITS = 16
@@ -29,4 +29,16 @@ def split_digest(root: str | Path, split: str) -> str:
         for view, file in sorted(zip(files.source_names, files.source_files, strict=True)):
             digest.update(f"{name} {view} {size[0]}x{size[1]}\n".encode())
             digest.update(read_rgba(file, size).numpy().tobytes())
+    return digest.hexdigest()[:DIGITS]
+
+
+def training_digest(root: str | Path, split: str) -> str:
+    """Hexadecimal digest of what is trained on: that of a split, and its characters' cameras and lists of pictures.
+
+    Raises:
+        DataError: If the split is empty or a file is missing or unreadable.
+    """
+    digest = hashlib.sha256(split_digest(root, split).encode())
+    for name in names_of(read_dataset(root), split):
+        digest.update((Path(root) / name / TRANSFORMS_FILE).read_bytes())
     return digest.hexdigest()[:DIGITS]

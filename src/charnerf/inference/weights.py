@@ -15,6 +15,7 @@ from charnerf.config.foreign import chosen_sections, parse_json, read_yaml
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import write_aside, write_text
 from charnerf.inference.build import build_model, build_renderer
+from charnerf.inference.checkpoint_file import read_checkpoint
 from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 
@@ -192,21 +193,13 @@ def _note_of(file: Path) -> str | None:
 
 def _read_checkpoint(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
     """Config from the run folder that the checkpoint lies in, weights from the checkpoint."""
-    try:
-        content = torch.load(file, map_location="cpu", weights_only=True)
-        prefix = "model."
-        state = {
-            name.removeprefix(prefix): value
-            for name, value in content["state_dict"].items()
-            if name.startswith(prefix)
-        }
-        if not all(isinstance(value, Tensor) for value in state.values()):
-            raise TypeError("its state_dict holds other things than tensors")
-    except Exception as error:  # torch raises many kinds on files that are no checkpoints
+    content, prefix = read_checkpoint(file, sealed=False).get("state_dict"), "model."
+    if not isinstance(content, Mapping) or not all(isinstance(one, Tensor) for one in content.values()):
         raise DataError(
-            f"{file}: can not be read as a checkpoint ({' '.join(str(error).split())[:200]}), expected one"
-            " that a run wrote."
-        ) from error
+            f"{file}: can not be read as a checkpoint (its state_dict holds other things than tensors), expected one that a run"
+            " wrote."
+        )
+    state = {name.removeprefix(prefix): one for name, one in content.items() if str(name).startswith(prefix)}
     folder = run_folder(file)
     if folder is None:
         raise DataError(

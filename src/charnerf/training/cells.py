@@ -19,6 +19,7 @@ from omegaconf import DictConfig
 from charnerf.config.grid import config_hash
 from charnerf.errors import DataError
 from charnerf.files import read_text, write_text
+from charnerf.training.checkpoint import has_checkpoint
 from charnerf.training.run import run_training
 
 log = logging.getLogger(__name__)
@@ -130,11 +131,10 @@ def cells_of(grid: Path, *, since: float = 0.0) -> list[Cell]:
 
 def _train(cfg: DictConfig, folder: Path, train: Callable[[DictConfig, Path], None]) -> Cell:
     """Train, from the cell's own checkpoint where it has one."""
-    last = folder / "checkpoints" / "last.ckpt"
-    if last.is_file():
-        log.info("Goes on from %s.", last)
+    if has_checkpoint(folder):
+        log.info("Goes on from the last checkpoint of %s.", folder)
         cfg = cfg.copy()
-        cfg.ckpt_path = str(last)
+        cfg.ckpt_path = "last"
     (folder / ERROR_FILE).unlink(missing_ok=True)
     started = time.time()
     _write(folder, Cell(folder.name, RUNNING, None, started, None))

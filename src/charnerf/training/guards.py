@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from charnerf.errors import NumericalError
+from charnerf.files import write_aside
 from charnerf.training.module import TrainingModule
 from charnerf.types import TrainBatch
 
@@ -43,7 +44,9 @@ class FiniteGuard(L.Callback):
         if isinstance(loss, Tensor) and bool(loss.isfinite().all()):
             return
         path = self.folder / f"nonfinite_batch_{batch.step:07d}.pt"
-        torch.save({"step": batch.step, "names": batch.names, "rgb": batch.rgb, "alpha": batch.alpha}, path)
+        content = {"step": batch.step, "names": batch.names, "rgb": batch.rgb, "alpha": batch.alpha}
+        with write_aside(path) as aside:
+            torch.save(content, aside)
         raise NumericalError(
             f"train/loss/total at step {batch.step}: found {loss}, expected a finite number. The batch (characters "
             f"{', '.join(batch.names)}) is in {path}; lower optimizer.lr, or resume from checkpoints/last.ckpt."

@@ -8,8 +8,11 @@ import lightning as L
 from omegaconf import DictConfig
 
 from charnerf.data.base import AbstractData
+from charnerf.data.datamodule import MixedDataModule
+from charnerf.files import write_text
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.inference.weights import save_config, save_weights
+from charnerf.interruption import held
 from charnerf.losses.base import Needs
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
@@ -17,6 +20,7 @@ from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.clock import RunClock
 from charnerf.training.data import build_data
 from charnerf.training.finish import finish_run
+from charnerf.training.identity import RunIdentity, check_config, check_data, data_of
 from charnerf.training.module import TrainingModule
 from charnerf.training.start import begin
 from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
@@ -42,30 +46,28 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     source.check_splits(**cfg.splits)
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
-    save_config(folder, cfg)
+    if checkpoint is not None:
+        check_config(checkpoint, cfg)
     losses, needs = build_losses(cfg)
     model = build_model(cfg)
     start = begin(model, cfg) if checkpoint is None else None
     root = source.prepare(depth=needs.depth)
+    identity = _identity(cfg, folder, root, checkpoint)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = build_module(cfg, model, renderer, losses, clock)
     data = build_data(cfg, root, model, clock, needs)
     threads = ThreadTuner(adapts=may_choose(budget_seconds=cfg.budget.seconds))
-    trainer = build_trainer(cfg, folder, clock, losses.names, threads)
+    with held():  # until a checkpoint, or the weights, are whole
+        trainer = build_trainer(cfg, folder, clock, losses.names, threads, identity)
+        if trainer.is_global_zero:
+            log_hyperparameters(trainer, cfg, model)
+            _note_start(folder, start)
+        _fit(trainer, module, data, checkpoint)
+        if trainer.is_global_zero:
+            save_weights(folder / "weights.safetensors", model, cfg)
+            save_config(folder, cfg)
     if trainer.is_global_zero:
-        log_hyperparameters(trainer, cfg, model)
-        if start is not None:
-            log.warning(start)
-            (folder / START_FILE).write_text(f"{start}\n", encoding="utf-8")
-    with warnings.catch_warnings():
-        # the loaders are fed from memory, one request at a time: more workers would not help
-        warnings.filterwarnings("ignore", message=".*does not have many workers.*")
-        warnings.filterwarnings("ignore", message=".*LeafSpec.*", category=DeprecationWarning)
-        warnings.filterwarnings("ignore", message=".*LeafSpec.*", category=FutureWarning)
-        trainer.fit(module, datamodule=data, ckpt_path=checkpoint, weights_only=checkpoint is not None)
-    if trainer.is_global_zero:
-        save_weights(folder / "weights.safetensors", model, cfg)
         finish_run(
             cfg,
             folder,
@@ -76,6 +78,33 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
             threads=threads,
             trainer=trainer,
         )
+
+
+def _identity(cfg: DictConfig, folder: Path, root: Path, checkpoint: Path | None) -> RunIdentity:
+    """What the run's checkpoints say of it; its config is written if it is new, else with the next checkpoint."""
+    identity = RunIdentity(cfg, data_of(cfg, root))
+    if checkpoint is None:
+        save_config(folder, cfg)
+    else:
+        check_data(checkpoint, identity.data)
+    return identity
+
+
+def _note_start(folder: Path, start: str | None) -> None:
+    """Say where the weights of a run began, if that was not random."""
+    if start is not None:
+        log.warning(start)
+        write_text(folder / START_FILE, f"{start}\n")
+
+
+def _fit(trainer: L.Trainer, module: TrainingModule, data: MixedDataModule, checkpoint: Path | None) -> None:
+    """Train, without what Lightning warns of and does not concern us."""
+    with warnings.catch_warnings():
+        # the loaders are fed from memory, one request at a time: more workers would not help
+        warnings.filterwarnings("ignore", message=".*does not have many workers.*")
+        warnings.filterwarnings("ignore", message=".*LeafSpec.*", category=DeprecationWarning)
+        warnings.filterwarnings("ignore", message=".*LeafSpec.*", category=FutureWarning)
+        trainer.fit(module, datamodule=data, ckpt_path=checkpoint, weights_only=checkpoint is not None)
 
 
 def build_losses(cfg: DictConfig) -> tuple[WeightedLosses, Needs]:

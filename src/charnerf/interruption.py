@@ -1,0 +1,126 @@
+"""SIGTERM and SIGINT: the first asks a process to end, a second one ends it at once.
+
+A door listens (`listening`); then a signal raises `Stopped`, which cleans up as an error does and ends in exit status 143
+or 130. Work that has to come to a point of its own first holds signals back (`held`).
+"""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
+_DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+_NOTE = b"\nstopping as soon as what is at hand is whole; a second signal ends at once.\n"
+
+
+class Stopped(BaseException):
+    """A signal asked the process to end; no `Exception`, so that what goes on after errors does not go on after this.
+
+    Attributes:
+        number: The signal's.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+    @property
+    def status(self) -> int:
+        """The exit status: 128 and the signal's number, as shells say it."""
+        return 128 + self.number
+
+    def __str__(self) -> str:
+        return f"stopped by {signal.Signals(self.number).name}."
+
+
+@dataclass
+class _Interruption:
+    """What signals have asked for.
+
+    Attributes:
+        received: Number of the signal that came, None before.
+        holds: How many blocks hold signals back.
+        process: Which process listens; those that it forks leave signals to it.
+    """
+
+    received: int | None = None
+    holds: int = 0
+    process: int = 0
+
+
+_interruption = _Interruption()
+
+
+@contextmanager
+def listening() -> Iterator[None]:
+    """Let the first signal raise `Stopped` meanwhile; a handler that somebody else has set stays.
+
+    Only the main thread can listen; in others this does nothing.
+    """
+    mine = []
+    if threading.current_thread() is threading.main_thread():
+        mine = [number for number in SIGNALS if signal.getsignal(number) in _DEFAULTS]
+    before = {number: signal.getsignal(number) for number in mine}
+    if mine:
+        _interruption.received, _interruption.process = None, os.getpid()
+        listen(mine)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if mine:
+            _interruption.received, _interruption.process = None, 0
+
+
+def listen(numbers: tuple[signal.Signals, ...] | list[signal.Signals] = SIGNALS) -> None:
+    """Take signals (again, where a library has put a handler of its own before ours)."""
+    for number in numbers:
+        signal.signal(number, _on_signal)
+
+
+def is_listening() -> bool:
+    """Whether this process, not one that it was forked from, listens."""
+    return _interruption.process == os.getpid()
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """Hold signals back: one that came raises `Stopped` when the block ends without another error.
+
+    A block that can end early looks at `requested`.
+    """
+    _interruption.holds += 1
+    try:
+        yield
+    finally:
+        _interruption.holds -= 1
+    if _interruption.received is not None and not _interruption.holds:
+        raise Stopped(_interruption.received)
+
+
+def requested() -> int | None:
+    """Number of the signal that came; None before."""
+    return _interruption.received
+
+
+def leave_signals_to_parent() -> None:
+    """Ignore both signals in a worker process: who asks a group of processes to end is answered by their parent."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _on_signal(number: int, _: FrameType | None) -> None:
+    if not is_listening():  # forked meanwhile
+        os._exit(128 + number)
+    if _interruption.received is not None:
+        os._exit(128 + number)
+    _interruption.received = number
+    os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, _NOTE)
+    if not _interruption.holds:
+        raise Stopped(number)

@@ -1,0 +1,166 @@
+"""Which checkpoint a run goes on from, and what happens where it is broken, another's, or can not be written."""
+
+import logging
+from pathlib import Path
+
+import pytest
+import torch
+
+from charnerf.capture.procedural_data import generate_dataset
+from charnerf.errors import ConfigError, DataError
+from charnerf.inference.checkpoint_file import read_checkpoint, write_checkpoint
+from charnerf.inference.weights import load_config
+from charnerf.training import run as run_module
+from charnerf.training.checkpoint import find_checkpoint
+from charnerf.training.run import run_training
+from support import small_runs
+
+SMALL = ("encoder=single", "scale.steps=4", "validation.times=4")
+
+
+@pytest.fixture
+def no_finish(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs end with their training."""
+    monkeypatch.setattr(run_module, "finish_run", lambda *_, **__: None)
+
+
+def write_steps(folder: Path, last: int, previous: int | None = None) -> Path:
+    checkpoints = folder / "checkpoints"
+    write_checkpoint(checkpoints / "last.ckpt", {"global_step": last})
+    if previous is not None:
+        write_checkpoint(checkpoints / "previous.ckpt", {"global_step": previous})
+    return checkpoints
+
+
+def flip(file: Path) -> None:
+    raw = bytearray(file.read_bytes())
+    raw[len(raw) // 2] ^= 1
+    file.write_bytes(raw)
+
+
+def test_a_broken_last_one_is_named_and_the_one_before_is_taken(tmp_path, caplog):
+    checkpoints = write_steps(tmp_path, last=8, previous=6)
+    flip(checkpoints / "last.ckpt")
+    with caplog.at_level(logging.WARNING):
+        file = find_checkpoint("last", tmp_path)
+    assert file == checkpoints / "previous.ckpt" and read_checkpoint(file)["global_step"] == 6
+    assert (
+        "last.ckpt: can not be read" in caplog.text and f"Goes on from the one before, {file}" in caplog.text
+    )
+    # what the run writes next does not put the broken one in the place of the good one
+    assert not (checkpoints / "last.ckpt").exists() and (checkpoints / "last.ckpt.broken").is_file()
+
+
+def test_where_both_are_broken_or_there_is_no_other_that_is_said(tmp_path):
+    checkpoints = write_steps(tmp_path, last=8)
+    flip(checkpoints / "last.ckpt")
+    with pytest.raises(DataError, match=r"last\.ckpt: can not be read.*There is none before it"):
+        find_checkpoint("last", tmp_path)
+    write_steps(tmp_path, last=8, previous=6)
+    for name in ("last", "previous"):
+        flip(checkpoints / f"{name}.ckpt")
+    with pytest.raises(DataError, match=r"previous\.ckpt: can not be read"):
+        find_checkpoint("last", tmp_path)
+    with pytest.raises(DataError, match=r"last\.ckpt: can not be read"):
+        find_checkpoint(str(checkpoints / "last.ckpt"), tmp_path)
+
+
+def test_a_neighbours_checkpoint_is_taken_only_when_it_is_named(tmp_path, caplog):
+    checkpoints = write_steps(tmp_path / "neighbour", last=8)
+    with caplog.at_level(logging.WARNING):
+        assert find_checkpoint("last", tmp_path / "mine") is None
+    assert "mine holds no checkpoint, so the run begins" in caplog.text
+    assert f"hydra.run.dir={tmp_path / 'neighbour'}" in caplog.text
+    named = str(checkpoints / "last.ckpt")
+    assert find_checkpoint(named, tmp_path / "mine") == Path(named)
+
+
+@pytest.mark.parametrize(
+    "there", ["checkpoints/last.ckpt", "checkpoints/previous.ckpt", "weights.safetensors"]
+)
+def test_a_new_run_takes_no_folder_of_another(tmp_path, there):
+    (tmp_path / there).parent.mkdir(exist_ok=True)
+    (tmp_path / there).touch()
+    with pytest.raises(ConfigError, match=rf"holds a run already \({there}\).*ckpt_path=last"):
+        find_checkpoint(None, tmp_path)
+
+
+def test_a_run_keeps_its_last_two_and_says_whose_they_are(figure_dataset, tmp_path, no_finish):
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL)
+    run_training(cfg, tmp_path)
+    steps = {file.name: read_checkpoint(file)["global_step"] for file in (tmp_path / "checkpoints").iterdir()}
+    assert (steps["last.ckpt"], steps["previous.ckpt"]) == (4, 3)
+    assert set(steps) == {"last.ckpt", "previous.ckpt", "best.ckpt"}
+    run = read_checkpoint(tmp_path / "checkpoints/last.ckpt")["charnerf"]
+    assert run["format"] == "charnerf-checkpoint-1" and set(run["data"]) == {"train", "val"}
+    assert run["config"]["scale.width"] == 16
+
+    config = (tmp_path / "config.yaml").read_text()
+    other = small_runs.smoke_config(
+        figure_dataset, *SMALL, "ckpt_path=last", "batches.foreground_share=0.7", "seed=1"
+    )
+    with pytest.raises(ConfigError, match=r"of a run with settings of its own") as error:
+        run_training(other, tmp_path)
+    keys = [line.split(":")[0].strip() for line in str(error.value).splitlines()[1:]]
+    assert keys == ["batches.foreground_share", "seed"]
+    assert (tmp_path / "config.yaml").read_text() == config  # of the state that is there
+
+    free = (
+        "budget.steps=5",
+        "validation.times=1",
+        "batches.memory_mib=100",
+        "name=other",
+        "scale.eval_views=1",
+    )
+    run_training(small_runs.smoke_config(figure_dataset, *SMALL, "ckpt_path=last", *free), tmp_path)
+    assert read_checkpoint(tmp_path / "checkpoints/last.ckpt")["global_step"] == 5
+    assert load_config(tmp_path).budget.steps == 5
+
+
+def test_the_order_of_augmentations_is_a_setting(figure_dataset, tmp_path, no_finish):
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL, "augmentation=[recolor,mirror]")
+    small = small_runs.smoke_config(figure_dataset, *SMALL, "augmentation=[mirror,recolor]", "ckpt_path=last")
+    run_training(cfg, tmp_path)
+    with pytest.raises(ConfigError, match=r"augmentation: found mirror recolor, expected recolor mirror"):
+        run_training(small, tmp_path)
+
+
+def test_another_data_set_is_refused_wherever_it_lies(figure_dataset, tmp_path, no_finish):
+    run_training(small_runs.smoke_config(figure_dataset, *SMALL), tmp_path / "run")
+    generate_dataset(tmp_path / "set", 1, 1, 1, seed=5, views=2, size=32, processes=1)
+    cfg = small_runs.smoke_config(tmp_path / "set", *SMALL, "ckpt_path=last")
+    with pytest.raises(
+        ConfigError, match=r"a data set of its own.*\n  digest of split train: found \w+, expected"
+    ):
+        run_training(cfg, tmp_path / "run")
+
+
+def test_a_checkpoint_that_does_not_say_whose_it_is_begins_nothing(figure_dataset, tmp_path, no_finish):
+    write_steps(tmp_path, last=3)
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL, "ckpt_path=last")
+    with pytest.raises(ConfigError, match="does not say of which run it is"):
+        run_training(cfg, tmp_path)
+
+
+def test_a_run_that_goes_on_from_the_one_before_ends_as_the_straight_one(figure_dataset, tmp_path, no_finish):
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL)
+    run_training(cfg, tmp_path / "straight")
+    run_training(cfg, tmp_path / "broken")
+    flip(tmp_path / "broken/checkpoints/last.ckpt")
+    cfg.ckpt_path = "last"
+    run_training(cfg, tmp_path / "broken")
+    ends = [
+        read_checkpoint(tmp_path / name / "checkpoints/last.ckpt")["state_dict"]
+        for name in ("straight", "broken")
+    ]
+    assert all(torch.equal(value, ends[1][key]) for key, value in ends[0].items())
+
+
+def test_a_run_that_can_not_write_its_checkpoint_fails(figure_dataset, tmp_path, no_finish):
+    """Lightning's own writer swallows PermissionError: the run would end well without any."""
+    if not Path("/sys/kernel").is_dir():
+        pytest.skip("needs a folder that refuses everybody")
+    (tmp_path / "checkpoints").symlink_to("/sys/kernel")
+    with pytest.raises(DataError, match=r"checkpoints/\w+\.ckpt: the checkpoint can not be written"):
+        run_training(small_runs.smoke_config(figure_dataset, *SMALL), tmp_path)
+    assert not (tmp_path / "weights.safetensors").exists()
