@@ -1,7 +1,8 @@
 """Train: `python train.py [group=option ...] [key=value ...]`; `-m` trains a grid and reports over it.
 
 The same grid typed again skips its finished cells and goes on with the others. Exit status: 0 done, 1 failed, 2 wrong
-call. HYDRA_FULL_ERROR=1 shows tracebacks. It is `charnerf train`, with the config files beside this one.
+call; 130 and 143 stopped by SIGINT (Ctrl-C) and SIGTERM, with a checkpoint. HYDRA_FULL_ERROR=1 shows tracebacks. It is
+`charnerf train`, with the config files beside this one.
 """
 
 import sys

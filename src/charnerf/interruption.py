@@ -6,7 +6,6 @@ or 130. Work that has to come to a point of its own first holds signals back (`h
 
 import os
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,28 +45,33 @@ class _Interruption:
         received: Number of the signal that came, None before.
         holds: How many blocks hold signals back.
         process: Which process listens; those that it forks leave signals to it.
+        in_worker: Whether it works for another.
     """
 
     received: int | None = None
     holds: int = 0
     process: int = 0
+    in_worker: bool = False
 
 
 _interruption = _Interruption()
 
 
 @contextmanager
-def listening() -> Iterator[None]:
+def listening(*, in_worker: bool = False) -> Iterator[None]:
     """Let the first signal raise `Stopped` meanwhile; a handler that somebody else has set stays.
 
     Only the main thread can listen; in others this does nothing.
+
+    Args:
+        in_worker: Of a pool: nothing is said, and no second signal ends it at once; a pool sends one when others have ended.
     """
     mine = []
     if threading.current_thread() is threading.main_thread():
         mine = [number for number in SIGNALS if signal.getsignal(number) in _DEFAULTS]
     before = {number: signal.getsignal(number) for number in mine}
     if mine:
-        _interruption.received, _interruption.process = None, os.getpid()
+        _interruption.received, _interruption.process, _interruption.in_worker = None, os.getpid(), in_worker
         listen(mine)
     try:
         yield
@@ -119,8 +123,11 @@ def _on_signal(number: int, _: FrameType | None) -> None:
     if not is_listening():  # forked meanwhile
         os._exit(128 + number)
     if _interruption.received is not None:
+        if _interruption.in_worker:
+            return
         os._exit(128 + number)
     _interruption.received = number
-    os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, _NOTE)
+    if not _interruption.in_worker:
+        os.write(2, _NOTE)
     if not _interruption.holds:
         raise Stopped(number)

@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -12,14 +13,16 @@ import numpy as np
 import trimesh
 from tqdm import tqdm
 
+from charnerf.capture import unfinished
 from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
 from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
 from charnerf.capture.variants import SEPARATOR, variant
 from charnerf.data.characters import CharacterPictures, remove_partial_characters, write_character
-from charnerf.data.layout import add_to_split, check_name, open_or_new, refuse_taken_names
+from charnerf.data.layout import add_to_split, check_name
 from charnerf.errors import CharNeRFError, DataError
+from charnerf.interruption import held
 from charnerf.surfaces.mesh_files import write_surface_mesh
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import SurfaceMesh
@@ -36,12 +39,14 @@ class CaptureReport:
     """What a capture did.
 
     Attributes:
-        captured: Names of the characters that are in the data set now, in the order given.
+        captured: Names of the characters that were put into the data set, in the order given.
         failed: One message for each mesh that could not be captured.
+        skipped: Names that were there already: the same capture was interrupted before.
     """
 
     captured: tuple[str, ...]
     failed: tuple[str, ...]
+    skipped: tuple[str, ...] = ()
 
 
 def capture_dataset(
@@ -59,7 +64,7 @@ def capture_dataset(
     seed: int = 0,
     processes: int | None = None,
 ) -> CaptureReport:
-    """Capture meshes into one split of a data set, new or already there.
+    """Capture meshes into one split of a data set, new or there; the same call goes on with one that was interrupted.
 
     Args:
         mesh_paths: Mesh files, and folders of them (not deeper); a character's name is its file's stem.
@@ -82,18 +87,18 @@ def capture_dataset(
         DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set.
         ConfigError: Before any work, if up and facing are no axes.
     """
-    options = options or CaptureOptions()
-    files, root = expand_mesh_paths(mesh_paths), Path(root)
-    check_name("split", split)
-    _check_axes(files, up, facing)
+    options, files, root = options or CaptureOptions(), expand_mesh_paths(mesh_paths), Path(root)
+    _check_call(files, split, up, facing)
     items = _items(files, variants, swaps, drawn)
-    _make_room(root, items)
+    note = unfinished.note_of(root, files, split, made_by(options), up, facing, variants, swaps, drawn, seed)
+    skipped = _make_room(root, split, items, note)
     donors = sorted(files)
     work = partial(
         _capture_item, root=root, options=options, donors=donors, draw=draw, up=up, facing=facing, seed=seed
     )
     add = partial(add_to_split, root, split, made_by=made_by(options))
-    return _capture_items(items, work, add, root=root, processes=processes)
+    with unfinished.noted(note, [item.name for item in items]):
+        return _capture_items(items, work, add, root=root, processes=processes, skipped=skipped)
 
 
 def capture_scene_to(
@@ -184,16 +189,23 @@ def _items(files: Sequence[Path], variants: int, swaps: int, drawn: int) -> list
     return items or [_Item(file) for file in files]
 
 
-def _check_axes(files: Sequence[Path], up: str | None, facing: str | None) -> None:
+def _check_call(files: Sequence[Path], split: str, up: str | None, facing: str | None) -> None:
+    check_name("split", split)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
 
 
-def _make_room(root: Path, items: Sequence[_Item]) -> None:
-    """Make the data set's folder; names that are taken are refused, what killed captures left goes."""
-    refuse_taken_names(open_or_new(root), [item.name for item in items])
+def _make_room(root: Path, split: str, items: Sequence[_Item], note: Path) -> frozenset[str]:
+    """Make the data set's folder; names that are taken are refused, what killed captures left goes.
+
+    Returns:
+        Names that are there from the same capture, which was interrupted.
+    """
+    names = [item.name for item in items]
+    done = unfinished.there_already(root, split, names, note)
     root.mkdir(parents=True, exist_ok=True)
     remove_partial_characters(root)
+    return done
 
 
 def _capture_items(
@@ -203,18 +215,22 @@ def _capture_items(
     *,
     root: Path,
     processes: int | None,
+    skipped: frozenset[str],
 ) -> CaptureReport:
     """Capture in parallel; `work` gives what is wrong with an item, `add` puts the others into the data set."""
+    items = [item for item in items if item.name not in skipped]
     messages: dict[_Item, str | None] = {}
     try:
         with tqdm(total=len(items), desc="capture", unit="character", dynamic_ncols=True) as bar:
-            for item, message in in_processes(work, items, processes):
-                if message is None:
-                    add([item.name])
-                else:
-                    bar.write(f"not captured: {message}")
-                messages[item] = message
-                bar.update()
+            with closing(in_processes(work, items, processes)) as results:
+                for item, message in results:
+                    if message is not None:
+                        bar.write(f"not captured: {message}")
+                    with held():
+                        if message is None:
+                            add([item.name])
+                        messages[item] = message
+                    bar.update()
     finally:  # interrupted: what was written meanwhile belongs to the data set too
         unlisted = [item.name for item in items if item not in messages and (root / item.name).is_dir()]
         if unlisted:
@@ -222,6 +238,7 @@ def _capture_items(
     return CaptureReport(
         captured=tuple(item.name for item in items if messages[item] is None),
         failed=tuple(message for item in items if (message := messages[item]) is not None),
+        skipped=tuple(sorted(skipped)),
     )
 
 

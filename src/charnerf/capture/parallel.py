@@ -2,8 +2,9 @@
 
 import multiprocessing
 import os
+import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import BaseContext
@@ -13,6 +14,7 @@ from typing import TypeVar
 import torch
 
 from charnerf.errors import DataError
+from charnerf.interruption import Stopped, listening
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -20,7 +22,7 @@ Result = TypeVar("Result")
 
 def in_processes(
     work: Callable[[Item], Result], items: Sequence[Item], processes: int | None
-) -> Iterator[tuple[Item, Result]]:
+) -> Generator[tuple[Item, Result], None, None]:
     """Do work on items, yielding each with its result as it ends.
 
     Args:
@@ -37,7 +39,7 @@ def in_processes(
             yield item, work(item)
         return
     with ProcessPoolExecutor(count, mp_context=_context(), initializer=_begin) as pool:
-        waiting = {pool.submit(work, item): item for item in items}
+        waiting = {pool.submit(_do, work, item): item for item in items}
         try:
             for done in as_completed(waiting):
                 yield waiting[done], done.result()
@@ -47,8 +49,17 @@ def in_processes(
                 "run the command again for the rest, with fewer processes."
             ) from err
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.shutdown(cancel_futures=True)  # waits for what is at hand
             raise
+
+
+def _do(work: Callable[[Item], Result], item: Item) -> Result:
+    """Do a work in a process of the pool; where a signal ends that, what is half done is cleaned up first."""
+    try:
+        with listening(in_worker=True):
+            return work(item)
+    except Stopped as stop:
+        os._exit(stop.status)  # the pool would go on with the next item
 
 
 def _context() -> BaseContext:
@@ -61,8 +72,9 @@ def _context() -> BaseContext:
 
 
 def _begin() -> None:
-    """Use one thread, and end with the parent even if that is killed."""
+    """Use one thread, leave Ctrl-C to the parent, and end with that even if it is killed."""
     torch.set_num_threads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_after, args=(parent,), daemon=True).start()

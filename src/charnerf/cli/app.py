@@ -1,4 +1,4 @@
-"""The commands, and how they leave: exit status 0 done, 1 failed, 2 wrong call; errors are one message.
+"""The commands, and how they leave: exit status 0 done, 1 failed, 2 wrong call, 130 or 143 stopped; errors are one message.
 
 A command's file imports what is heavy when the command runs, so that help and completion are instant.
 """
@@ -23,11 +23,16 @@ from charnerf.cli import (
     report,
     train,
 )
+from charnerf.cli.messages import say
 from charnerf.errors import CharNeRFError, ConfigError
+from charnerf.interruption import Stopped, listening
 from charnerf.process import limit_spinning
 
 FAILED, WRONG_CALL = 1, 2
-DEBUG_NOTE = "Exit status: 0 done, 1 failed, 2 wrong call. --debug shows the traceback of an error."
+DEBUG_NOTE = (
+    "Exit status: 0 done, 1 failed, 2 wrong call; 130 and 143 stopped by SIGINT (Ctrl-C) and SIGTERM."
+    " --debug shows the traceback of an error."
+)
 
 app = typer.Typer(
     name="charnerf",
@@ -87,8 +92,13 @@ def run(arguments: list[str]) -> int:
         typer.echo(f"charnerf {__version__}")
         return 0
     try:
-        # leaves by SystemExit, also for wrong options (2) and Ctrl-C (1)
-        app(arguments, prog_name="charnerf", obj=debug)
+        with listening():
+            app(
+                arguments, prog_name="charnerf", obj=debug
+            )  # leaves by SystemExit, also for wrong options (2)
+    except Stopped as stop:
+        say(str(stop))
+        return stop.status
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else FAILED if leaving.code else 0
     except Exception as error:

@@ -1,13 +1,16 @@
 """`charnerf capture`: meshes to a data set."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.options import Depth, Jobs, NewDataset, Size, Sources, Views
 from charnerf.errors import DataError
+
+if TYPE_CHECKING:
+    from charnerf.capture.dataset import CaptureReport
 
 Meshes = Annotated[
     list[Path],
@@ -71,12 +74,12 @@ def command(
     """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
 
     Every character is brought to 2 m height with its feet on the floor; its name is its file's stem, and one
-    that is in the data set already is refused. Exit status 1 if a mesh could not be captured; the others are.
+    that is in the data set already is refused. Exit status 1 if a mesh could not be captured; the others are. The
+    same command goes on with a capture that was interrupted.
     """
     from charnerf.capture.character import CaptureOptions
     from charnerf.capture.dataset import capture_dataset
     from charnerf.capture.lights import Headlight, Unlit
-    from charnerf.data.digest import split_digest
     from charnerf.drawings.redrawn import with_drawn_sources
 
     shown = Unlit() if light == "unlit" else Headlight()
@@ -94,8 +97,19 @@ def command(
         up=up,
         facing=facing,
     )
+    _report(done, output, split)
+
+
+def _report(done: "CaptureReport", output: Path, split: str) -> None:
+    """Say what was captured, and fail where something was not."""
+    from charnerf.data.digest import split_digest
+
+    if done.skipped:
+        say(
+            f"{len(done.skipped)} characters are there from the same capture, which was interrupted: skipped."
+        )
     say(f"{len(done.captured)} characters captured into {output}, split {split}.")
-    if done.captured:
+    if done.captured or done.skipped:
         say(f"{split}: digest {split_digest(output, split)}")
     if done.failed:
         raise DataError(f"{len(done.failed)} meshes could not be captured:\n  " + "\n  ".join(done.failed))

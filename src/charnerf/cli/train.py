@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from charnerf.cli.messages import say
+from charnerf.interruption import Stopped, listening
 from charnerf.process import keep_freed_memory, limit_spinning, use_fastest_products
 
 if TYPE_CHECKING:
@@ -34,14 +36,20 @@ def main(arguments: Sequence[str], *, conf: Path | None = None) -> int:
         conf: Folder of the config files; the package's own if None.
 
     Returns:
-        Exit status: 0 done, 1 failed, 2 wrong call. HYDRA_FULL_ERROR=1 shows tracebacks.
+        Exit status: 0 done, 1 failed, 2 wrong call; 130 and 143 stopped by SIGINT (Ctrl-C) and SIGTERM, with a checkpoint.
+        HYDRA_FULL_ERROR=1 shows tracebacks.
     """
     limit_spinning()
-    from charnerf.config.command_line import run_door
-    from charnerf.config.options import conf_folder
+    try:
+        with listening():
+            from charnerf.config.command_line import run_door
+            from charnerf.config.options import conf_folder
 
-    folder = (conf or conf_folder()).resolve()
-    return run_door(lambda: _train(list(arguments), folder), arguments=arguments, conf=folder)
+            folder = (conf or conf_folder()).resolve()
+            return run_door(lambda: _train(list(arguments), folder), arguments=arguments, conf=folder)
+    except Stopped as stop:
+        say(str(stop))
+        return stop.status
 
 
 def _train(arguments: list[str], conf: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 
 from charnerf.errors import DataError
-from charnerf.files import sync_folder, write_aside, write_synced
+from charnerf.files import open_regular, sync_folder, write_aside, write_synced
 
 _MARK = b"charnerf-sha256:"
 _SEAL_SIZE = len(_MARK) + 2 * hashlib.sha256().digest_size
@@ -54,12 +54,15 @@ def read_checkpoint(path: Path, *, sealed: bool = True) -> dict[str, Any]:
         DataError: If it can not be read, or a byte of it has changed.
     """
     try:
-        raw = path.read_bytes()
+        with open_regular(path) as file:
+            raw = file.read()
         if sealed or raw[-_SEAL_SIZE:].startswith(_MARK):
             _check_seal(raw)
         content = torch.load(io.BytesIO(raw), map_location="cpu", weights_only=True)
         if not isinstance(content, dict):
             raise TypeError(f"it holds a {type(content).__name__}")
+    except DataError:
+        raise
     except Exception as error:  # torch raises many kinds on files that are no checkpoints
         raise DataError(
             f"{path}: can not be read as a checkpoint ({' '.join(str(error).split())[:200]}), expected one"

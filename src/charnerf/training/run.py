@@ -2,6 +2,8 @@
 
 import logging
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import lightning as L
@@ -12,7 +14,7 @@ from charnerf.data.datamodule import MixedDataModule
 from charnerf.files import write_text
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.inference.weights import save_config, save_weights
-from charnerf.interruption import held
+from charnerf.interruption import Stopped, held
 from charnerf.losses.base import Needs
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
@@ -68,16 +70,17 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
             save_weights(folder / "weights.safetensors", model, cfg)
             save_config(folder, cfg)
     if trainer.is_global_zero:
-        finish_run(
-            cfg,
-            folder,
-            root,
-            model.eval(),
-            renderer,
-            train_seconds=clock.seconds,
-            threads=threads,
-            trainer=trainer,
-        )
+        with _trained(folder):
+            finish_run(
+                cfg,
+                folder,
+                root,
+                model.eval(),
+                renderer,
+                train_seconds=clock.seconds,
+                threads=threads,
+                trainer=trainer,
+            )
 
 
 def _identity(cfg: DictConfig, folder: Path, root: Path, checkpoint: Path | None) -> RunIdentity:
@@ -95,6 +98,20 @@ def _note_start(folder: Path, start: str | None) -> None:
     if start is not None:
         log.warning(start)
         write_text(folder / START_FILE, f"{start}\n")
+
+
+@contextmanager
+def _trained(folder: Path) -> Iterator[None]:
+    """Say what is there where a signal stops what follows training."""
+    try:
+        yield
+    except Stopped:
+        log.warning(
+            "Stopped after training; the weights are %s. The same command evaluates them with hydra.run.dir=%s ckpt_path=last",
+            folder / "weights.safetensors",
+            folder,
+        )
+        raise
 
 
 def _fit(trainer: L.Trainer, module: TrainingModule, data: MixedDataModule, checkpoint: Path | None) -> None:

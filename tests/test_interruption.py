@@ -1,0 +1,95 @@
+"""SIGTERM and SIGINT: the first asks, the second ends at once."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import pytest
+
+from charnerf.cli import run as charnerf
+from charnerf.files import write_folder_aside
+from charnerf.interruption import Stopped, held, listening, requested
+
+
+def ask(number: int) -> None:
+    os.kill(os.getpid(), number)
+    time.sleep(0.01)  # handlers run between two instructions
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_signal_stops_what_runs_and_handlers_are_put_back(number, status):
+    before = signal.getsignal(number)
+    with pytest.raises(Stopped) as stop, listening():
+        ask(number)
+    assert stop.value.status == status and str(stop.value) == f"stopped by {signal.Signals(number).name}."
+    assert signal.getsignal(number) is before and requested() is None
+
+
+def test_held_signals_are_answered_when_the_block_ends():
+    done = []
+    with pytest.raises(Stopped), listening():
+        with held():
+            with held():
+                ask(signal.SIGTERM)
+                done.append(requested())
+            done.append("inner")
+        done.append("never")
+    assert done == [signal.SIGTERM, "inner"]
+
+
+def test_an_error_of_the_block_comes_first():
+    with pytest.raises(ValueError), listening(), held():
+        ask(signal.SIGTERM)
+        raise ValueError
+
+
+def test_handlers_of_others_stay():
+    mine = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        with listening():
+            ask(signal.SIGTERM)
+        assert requested() is None
+    finally:
+        signal.signal(signal.SIGTERM, mine)
+
+
+def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/a").mkdir()
+    with pytest.raises(Stopped), listening(), write_folder_aside(tmp_path / "out") as aside:
+        (aside / "a").mkdir()
+        ask(signal.SIGINT)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"] and (tmp_path / "out/a").is_dir()
+
+
+def test_commands_end_with_the_signals_status(monkeypatch, capsys, tmp_path):
+    from charnerf.capture import dataset
+
+    monkeypatch.setattr(dataset, "expand_mesh_paths", lambda _: ask(signal.SIGTERM))
+    (tmp_path / "a.obj").touch()
+    assert charnerf(["capture", str(tmp_path / "a.obj"), "-o", str(tmp_path / "set")]) == 143
+    assert "stopped by SIGTERM." in capsys.readouterr().err
+
+
+def test_a_second_signal_ends_at_once():
+    code = """
+    import time
+    from charnerf.interruption import held, listening
+    with listening(), held():
+        print("ready", flush=True)
+        time.sleep(60)
+        time.sleep(60)
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGTERM)
+    process.stderr.readline()
+    assert b"a second signal ends at once" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=10) == 130

@@ -1,0 +1,126 @@
+"""A training that is asked to end writes a checkpoint, from which the run goes on as if nothing had been."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import lightning as L
+import pytest
+import torch
+
+from charnerf.inference.checkpoint_file import read_checkpoint
+from charnerf.interruption import Stopped, held, listening
+from charnerf.training import run
+from support import small_runs
+
+SMALL = ("encoder=single", "schedule=two_phase", "scale.steps=8", "validation.times=2")
+
+
+class Asking(L.Callback):
+    """Sends this process a signal, in a step or in the validation after it."""
+
+    def __init__(self, *, step: int, in_validation: bool = False) -> None:
+        self.step = step
+        self.in_validation = in_validation
+
+    def on_train_batch_start(self, trainer, pl_module, batch, batch_idx):
+        if batch.step == self.step and not self.in_validation:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    def on_validation_batch_start(self, trainer, *_):
+        if trainer.global_step == self.step + 1 and self.in_validation:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.parametrize(
+    ("settings", "step", "in_validation", "done"),
+    [
+        ((), 1, False, 2),
+        ((), 3, False, 4),  # a validation is due: the checkpoint follows it
+        ((), 3, True, 4),
+        (("averaging.decay=0.9", "batches.workers=1"), 5, False, 6),
+    ],
+)
+def test_a_run_that_is_stopped_goes_on_as_the_straight_one(
+    figure_dataset, tmp_path, caplog, settings, step, in_validation, done
+):
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL, *settings)
+    straight = small_runs.assemble(cfg, tmp_path / "straight").fit()
+    stopped = small_runs.assemble(cfg, tmp_path / "run")
+    stopped.trainer.callbacks.insert(1, Asking(step=step, in_validation=in_validation))
+    with pytest.raises(Stopped) as stop, listening(), held():
+        stopped.fit()
+    assert stop.value.status == 143
+    checkpoint = tmp_path / "run/checkpoints/last.ckpt"
+    assert f"Stopped after step {done}; the checkpoint is {checkpoint}" in caplog.text
+    assert read_checkpoint(checkpoint)["global_step"] == done
+
+    resumed = small_runs.assemble(cfg, tmp_path / "run").fit(checkpoint)
+    assert resumed.recorder.losses == straight.recorder.losses[done:]
+    assert torch.equal(small_runs.weights(resumed.module.model), small_runs.weights(straight.module.model))
+    curves = [(tmp_path / name / "curve.csv").read_text().splitlines() for name in ("straight", "run")]
+    assert [row.split(",")[0] for row in curves[0]] == [row.split(",")[0] for row in curves[1]]
+
+
+def test_a_run_that_is_stopped_in_its_evaluation_is_trained(figure_dataset, tmp_path, monkeypatch, caplog):
+    done = []
+
+    def finish(*_, **__):
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append("never")
+
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL)
+    with monkeypatch.context() as patch, pytest.raises(Stopped) as stop, listening():
+        patch.setattr(run, "finish_run", finish)
+        run.run_training(cfg, tmp_path)
+    assert stop.value.status == 130 and not done
+    assert f"Stopped after training; the weights are {tmp_path / 'weights.safetensors'}" in caplog.text
+    cfg.ckpt_path = "last"
+    monkeypatch.setattr(run, "finish_run", lambda *_, **__: done.append("again"))
+    run.run_training(cfg, tmp_path)
+    assert done == ["again"]
+
+
+def start(dataset: Path, folder: Path, *more: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "charnerf", "train", "scale=smoke", "trainer=cpu", "data=folder"]
+    settings = [f"data.root={dataset}", "validation.views=1", f"hydra.run.dir={folder}", *more]
+    return subprocess.Popen(
+        [*command, *settings],
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+def children(process: int) -> list[int]:
+    file = Path(f"/proc/{process}/task/{process}/children")
+    return [int(one) for one in file.read_text().split()] if file.is_file() else []
+
+
+def is_alive(process: int) -> bool:
+    """Whether a process is there and no zombie."""
+    file = Path(f"/proc/{process}/stat")
+    return file.is_file() and file.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_the_command_ends_with_its_status_and_its_workers(figure_dataset, tmp_path, number, status):
+    """The whole group of processes gets the signal, as from a terminal or a queue."""
+    long = ("scale.steps=100000", "validation.times=20000", "batches.workers=1")
+    process = start(figure_dataset, tmp_path / "run", *long)
+    last = tmp_path / "run/checkpoints/last.ckpt"
+    end = time.monotonic() + 300
+    while not last.is_file():
+        assert process.poll() is None and time.monotonic() < end
+        time.sleep(0.05)
+    workers = children(process.pid)
+    os.killpg(process.pid, number)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == status, err.decode()
+    assert str(last) in out.decode() + err.decode() and b"Traceback" not in err
+    assert read_checkpoint(last)["global_step"] >= 5
+    assert not any(is_alive(worker) for worker in workers)
