@@ -11,11 +11,14 @@ from charnerf.config.options import option
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawings
+from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.redrawn import VIEW_SHARES, redrawn, with_drawn_sources
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import ConfigError
 from charnerf.surfaces.mesh_files import load_surface_mesh
+
+AS_DRAWN = ReadingOptions(reconciled=False)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +66,7 @@ def test_views_differ_more_from_level_to_level(character):
     apart = []
     for level in range(len(LEVELS)):
         front, side, back = draw_character(character, size=128, seed=5, level=level).values()
-        read = read_views(turnaround(front, side, back), size=64, reconciled=False)
+        read = read_views(turnaround(front, side, back), size=64, options=AS_DRAWN)
         apart.append(read.reconciliation.views[2].apart_before)
     assert apart[0] <= apart[1] < apart[3] and apart[2] < apart[3]
     with pytest.raises(ConfigError, match="level: found 4, expected 0 to 3"):
@@ -78,7 +81,7 @@ def test_a_redrawn_character_keeps_its_truth(character):
     assert again.image_files == character.image_files and again.mesh_file == character.mesh_file
     front, back = again.sources.images[0, 0, 3], again.sources.images[0, 2, 3]
     assert torch.equal(back, front.flip(-1)), "reconciled: the back takes the mirrored front's outline"
-    loose = redrawn(character, level=2, seed=0, size=64, reconciled=False).sources.images[0]
+    loose = redrawn(character, level=2, seed=0, size=64, options=AS_DRAWN).sources.images[0]
     assert not torch.equal(loose[2, 3], loose[0, 3].flip(-1))
 
 

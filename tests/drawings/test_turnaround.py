@@ -7,6 +7,7 @@ from PIL import Image
 
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array
+from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import DataError
@@ -20,7 +21,9 @@ SIZE = 128
 
 def read_turnaround(front, side, back, *, size, side_is="left", reconciled=True):
     """Front, side and back, the side seen from the character's left or right."""
-    return read_views(turnaround(front, side, back, side_is=side_is), size=size, reconciled=reconciled)
+    return read_views(
+        turnaround(front, side, back, side_is=side_is), size=size, options=ReadingOptions(reconciled)
+    )
 
 
 def _arrays(pictures) -> list[np.ndarray]:

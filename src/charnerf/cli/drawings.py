@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from charnerf.cli.messages import say
+from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -57,6 +58,19 @@ AsDrawn = Annotated[
         "--as-drawn", help="Take views as they are drawn, also where they disagree; else they are mended."
     ),
 ]
+
+KeepInk = Annotated[
+    bool,
+    typer.Option(
+        "--keep-ink",
+        help="Take lines along outlines for paint; else they are painted over with the colours beside them.",
+    ),
+]
+
+
+def reading_options(*, as_drawn: AsDrawn = False, keep_ink: KeepInk = False) -> ReadingOptions:
+    """How drawings are read."""
+    return ReadingOptions(reconciled=not as_drawn, keep_ink=keep_ink)
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from charnerf.cli.drawings import AsDrawn
+from charnerf.cli.drawings import reading_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Dataset, Device, Trusted, Weights, is_count
+from charnerf.cli.options import Dataset, Device, Trusted, Weights, gathered, is_count
+from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions
@@ -70,6 +71,7 @@ NearestFrom = Annotated[
 ]
 
 
+@gathered(reading=reading_options)
 def command(
     *,
     data: Dataset,
@@ -84,7 +86,7 @@ def command(
     baselines: Baselines = True,
     nearest_from: NearestFrom = None,
     drawn: Drawn = None,
-    as_drawn: AsDrawn = False,
+    reading: ReadingOptions,
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -116,7 +118,7 @@ def command(
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=_train_seconds(run),
-        redrawn=as_captured if drawn is None else _redrawn(drawn, model.image_size, reconciled=not as_drawn),
+        redrawn=as_captured if drawn is None else _redrawn(drawn, model.image_size, reading),
     )
     _write(metrics, output, json_file)
     typer.echo(json.dumps(metrics, indent=2))
@@ -152,14 +154,14 @@ def _number_of_views(text: str | None) -> int | Literal["all"] | None:
     return int(text)
 
 
-def _redrawn(text: str, size: int, *, reconciled: bool) -> "Callable[[Character], Character]":
+def _redrawn(text: str, size: int, reading: ReadingOptions) -> "Callable[[Character], Character]":
     """What draws the source views of LEVEL[:SEED]."""
     from charnerf.drawings.redrawn import redrawn
 
     level, _, seed = text.partition(":")
     if not is_count(level) or not (is_count(seed, most=2**63) or not seed):
         raise ConfigError(f"--drawn: found '{text[:60]}', expected LEVEL or LEVEL:SEED, such as 2 or 2:7.")
-    return partial(redrawn, level=int(level), seed=int(seed or 0), size=size, reconciled=reconciled)
+    return partial(redrawn, level=int(level), seed=int(seed or 0), size=size, options=reading)
 
 
 def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:

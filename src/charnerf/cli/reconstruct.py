@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from charnerf.cli.drawings import AsDrawn, GivenDrawings, drawings_options
+from charnerf.cli.drawings import GivenDrawings, drawings_options, reading_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import (
@@ -18,16 +18,17 @@ from charnerf.cli.options import (
     gathered,
     mesh_options,
 )
+from charnerf.drawings.options import ReadingOptions
 from charnerf.meshing.options import MeshOptions
 from charnerf.reconstruction.options import LIGHT, ReconstructionOptions
 
 
-@gathered(given=drawings_options, mesh=mesh_options(LIGHT))
+@gathered(given=drawings_options, reading=reading_options, mesh=mesh_options(LIGHT))
 def command(
     given: GivenDrawings,
     *,
     output: Folder,
-    as_drawn: AsDrawn = False,
+    reading: ReadingOptions,
     weights: WeightsOption = None,
     mesh: MeshOptions,
     faces: Annotated[int | None, typer.Option(help="Faces of the mesh after decimation.")] = LIGHT.faces,
@@ -57,7 +58,5 @@ def command(
     from charnerf.reconstruction.folder import reconstruct
 
     model = load_model(weights, device=device, trust=trust)
-    done = reconstruct(
-        model, output, options, given.drawings, reconciled=not as_drawn, sheet=given.sheet, say=say
-    )
+    done = reconstruct(model, output, options, given.drawings, reading=reading, sheet=given.sheet, say=say)
     say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")

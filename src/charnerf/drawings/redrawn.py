@@ -6,6 +6,7 @@ import numpy as np
 
 from charnerf.data.characters import Character, CharacterPictures
 from charnerf.drawings.artist import LEVELS, captured, draw_character, on_paper
+from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import Viewpoint, turnaround, viewpoint
 from charnerf.pictures import to_bytes
@@ -22,7 +23,9 @@ VIEW_SHARES = {  # of training's turnarounds, by the views that they have
 }
 
 
-def redrawn(character: Character, *, level: int, seed: int, size: int, reconciled: bool = True) -> Character:
+def redrawn(
+    character: Character, *, level: int, seed: int, size: int, options: ReadingOptions | None = None
+) -> Character:
     """Draw a character's front, side and back at a level of disagreement, and take the drawings for its source views.
 
     Args:
@@ -30,7 +33,7 @@ def redrawn(character: Character, *, level: int, seed: int, size: int, reconcile
         level: As of `artist.draw_character`; at 0 it is returned as it is.
         seed: Of the artist.
         size: Side of the source views, pixels.
-        reconciled: Whether views that disagree are mended.
+        options: How the drawings are read.
 
     Raises:
         ConfigError: If there is no such level.
@@ -39,7 +42,7 @@ def redrawn(character: Character, *, level: int, seed: int, size: int, reconcile
     if level == 0:
         return character
     front, side, back = draw_character(character, size=SIDE, seed=seed, level=level).values()
-    read = read_views(turnaround(front, side, back), size=size, reconciled=reconciled)
+    read = read_views(turnaround(front, side, back), size=size, options=options)
     return replace(character, sources=read.views)
 
 

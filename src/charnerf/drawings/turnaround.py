@@ -1,7 +1,7 @@
 """Drawings of one character to source views: what was assumed and mended is told in sentences and drawn in a picture."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,7 +10,9 @@ import torch
 
 from charnerf.drawings.align import FigureBox, figure_box, half_extent, place
 from charnerf.drawings.cutout import Cutout, cut_out
+from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
+from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.picture import draw_assumptions
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
@@ -61,13 +63,15 @@ class _Figure:
     box: FigureBox
 
 
-def read_views(drawings: Mapping[Viewpoint, Picture], *, size: int, reconciled: bool = True) -> Turnaround:
+def read_views(
+    drawings: Mapping[Viewpoint, Picture], *, size: int, options: ReadingOptions | None = None
+) -> Turnaround:
     """Read, cut out, align and reconcile drawings of one character.
 
     Args:
         drawings: Picture files or arrays (H, W, 3 or 4) by where they are seen from; where they disagree, the first rules.
         size: S, side of the model's source pictures, pixels.
-        reconciled: Whether views that disagree are mended; else they are only compared.
+        options: What is done to them; everything if None.
 
     Raises:
         DataError: If there are fewer than two, two show one view, or one can not be used; the message names its file.
@@ -76,6 +80,8 @@ def read_views(drawings: Mapping[Viewpoint, Picture], *, size: int, reconciled: 
         raise DataError(f"size: found {size}, expected at least 16 pixels.")
     _check_viewpoints(drawings)
     figures = [_prepare(viewpoint, source) for viewpoint, source in drawings.items()]
+    options = options or ReadingOptions()
+    figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
     given = _canvases(figures, extent, size)
     agreement = reconcile(
@@ -86,7 +92,7 @@ def read_views(drawings: Mapping[Viewpoint, Picture], *, size: int, reconciled: 
     finest = max(round(2.0 * extent * figure.box.height / HEIGHT) for figure in figures)
     detail = min(max(finest, DETAIL[0], size), max(DETAIL[1], size))
     canvases, detailed, widened = given, _canvases(figures, extent, detail), None
-    if reconciled:
+    if options.reconciled:
         canvases, detailed = agreement.apply(canvases), agreement.apply(detailed)
         widened = agreement.widened_alphas(canvases)
     names = tuple(figure.viewpoint.name for figure in figures)
@@ -96,7 +102,11 @@ def read_views(drawings: Mapping[Viewpoint, Picture], *, size: int, reconciled: 
         names=names,
         half_extent=extent,
         reconciliation=agreement,
-        assumptions=(*_assumptions(figures, extent, size), *_mended(agreement, names, reconciled)),
+        assumptions=(
+            *_assumptions(figures, extent, size),
+            *inked,
+            *_mended(agreement, names, options.reconciled),
+        ),
         warnings=(*_small_figures(figures, extent, size), *_disagreements(agreement, figures)),
         picture=draw_assumptions(
             given, canvases, list(names), [figure.drawing.name for figure in figures], extent
@@ -159,6 +169,22 @@ def _prepare(viewpoint: Viewpoint, source: Picture) -> _Figure:
         drawing = load_drawing(source)
     cutout = cut_out(drawing)
     return _Figure(viewpoint, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
+
+
+def _without_ink(figures: Sequence[_Figure]) -> tuple[list[_Figure], tuple[str, ...]]:
+    """The figures without lines along their outlines, and a sentence; as they are where few outlines have any."""
+    found = [find_outline_ink(figure.cutout.rgba) for figure in figures]
+    share = sum(one.share for one in found) / len(found)
+    if share < INKED:
+        return list(figures), ()
+    painted = [
+        replace(figure, cutout=replace(figure.cutout, rgba=painted_over(figure.cutout.rgba, ink)))
+        for figure, ink in zip(figures, found, strict=True)
+    ]
+    return painted, (
+        f"{100 * share:.0f} % of the outlines are drawn as lines: these were taken for ink and painted over with the colours"
+        " beside them (--keep-ink leaves them).",
+    )
 
 
 def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:

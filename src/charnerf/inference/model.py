@@ -9,6 +9,7 @@ from typing import Any, Literal, final
 
 import torch
 
+from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.turnaround import Picture, read_views
 from charnerf.drawings.viewpoints import Viewpoint, turnaround, viewpoint
 from charnerf.errors import DataError, ShapeError
@@ -90,9 +91,11 @@ class Model:
             drawings[viewpoint(name)] = one
         return self.encode_drawings(drawings)
 
-    def encode_drawings(self, drawings: Mapping[Viewpoint, Picture], *, reconciled: bool = True) -> Hero:
+    def encode_drawings(
+        self, drawings: Mapping[Viewpoint, Picture], options: ReadingOptions | None = None
+    ) -> Hero:
         """Encode one character from drawings by where they are seen from; arguments as of `drawings.turnaround.read_views`."""
-        read = read_views(drawings, size=self.image_size, reconciled=reconciled)
+        read = read_views(drawings, size=self.image_size, options=options)
         hero = self.encode_views(read.views, detailed=read.detailed)
         return replace(hero, turnaround=read)
 

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
+from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.turnaround import Picture, Turnaround
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.files import check_folder, write_folder_aside
@@ -61,7 +62,7 @@ def reconstruct(
     options: ReconstructionOptions,
     given: Mapping[Viewpoint, Picture],
     *,
-    reconciled: bool = True,
+    reading: ReadingOptions | None = None,
     sheet: np.ndarray | None = None,
     say: Callable[[str], object] = lambda line: None,
 ) -> Reconstruction:
@@ -75,7 +76,7 @@ def reconstruct(
         output: Folder; made if missing.
         options: What is made.
         given: Drawings by where they are seen from; where they disagree, the first rules.
-        reconciled: Whether drawings that disagree are mended.
+        reading: How the drawings are read.
         sheet: RGB picture of the sheet that they were found on, shown in the report; None where there was none.
         say: Gets what was assumed and made, sentence by sentence.
 
@@ -86,7 +87,7 @@ def reconstruct(
     check_folder(output)
     seconds: dict[str, float] = {}
     with _timed(seconds, "encode"):
-        hero, drawings = _encoded(model, given, reconciled, say)
+        hero, drawings = _encoded(model, given, reading, say)
     hero, refined = _refined(model, hero, options.refine_seconds, seconds, say)
     pictures, built = _pictures_and_mesh(hero.symmetric() if options.symmetric else hero, options, seconds)
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
@@ -115,10 +116,13 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 def _encoded(
-    model: Model, given: Mapping[Viewpoint, Picture], reconciled: bool, say: Callable[[str], object]
+    model: Model,
+    given: Mapping[Viewpoint, Picture],
+    reading: ReadingOptions | None,
+    say: Callable[[str], object],
 ) -> tuple[Hero, Turnaround]:
     """The character, and its drawings as they were read."""
-    hero = model.encode_drawings(given, reconciled=reconciled)
+    hero = model.encode_drawings(given, reading)
     drawings = hero.turnaround
     assert drawings is not None  # encode made it
     for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
