@@ -30,7 +30,7 @@ from charnerf.process import limit_spinning
 
 FAILED, WRONG_CALL = 1, 2
 DEBUG_NOTE = (
-    "Exit status: 0 done, 1 failed, 2 wrong call; 130 and 143 stopped by SIGINT (Ctrl-C) and SIGTERM."
+    "Exit status: 0 done, 1 failed, 2 wrong call. 130 stopped by Ctrl-C (SIGINT), 143 by SIGTERM."
     " --debug shows the traceback of an error."
 )
 
