@@ -171,3 +171,14 @@ def test_without_an_encoder_the_turntable_is_a_gif(tmp_path, monkeypatch):
     path, note = turntable.write_film(frames, tmp_path)
     assert path.name == "turntable.gif" and "no ffmpeg" in note
     assert Image.open(path).n_frames == 4
+
+
+def test_pictures_frame_the_figure_and_not_its_limits(drawings):
+    """Where views only colour, the hull is the whole space: pictures are framed as the drawings frame the figure all the same."""
+    hero = FakeModel().encode_drawings(turnaround(*drawings.values()))
+    wide = replace(hero.views, widened_alphas=torch.ones_like(hero.views.carving_alphas))
+    hull = build_hull(wide, box_min=BOX[0], box_max=BOX[1], grid_size=32)[0]
+    loose = replace(hero, scene=replace(hero.scene, bounds=Bounds(*BOX, hull)))
+    assert hero.turnaround.half_extent == pytest.approx(1.05, abs=0.02)
+    assert loose.radius() == pytest.approx(hero.turnaround.half_extent, abs=1e-4)
+    assert hero.radius() <= loose.radius()

@@ -141,7 +141,10 @@ class Hero:
             )
 
     def radius(self) -> float:
-        """Radius around (0, 0, 1) that pictures frame, m: of the hull with a margin, at least 1.05 m."""
+        """Radius around (0, 0, 1) that pictures frame, m: as wide as the drawings, which frame the figure, or of the hull.
+
+        The hull counts with a margin, where it is narrower or a drawing has a perspective; at least 1.05 m.
+        """
         bounds = self.scene.bounds
         hull, box_min = bounds.hull, bounds.box_min
         if hull is None:
@@ -151,7 +154,15 @@ class Hero:
             return framing_radius(0.0)
         cell = (hull.box_max - hull.box_min) / torch.tensor(hull.occupancy.shape, device=box_min.device)
         centres = hull.box_min + (occupied + 0.5) * cell
-        return framing_radius(math.sqrt(float((centres - box_min.new_tensor(CENTRE)).square().sum(-1).max())))
+        reach = math.sqrt(float((centres - box_min.new_tensor(CENTRE)).square().sum(-1).max()))
+        return min(framing_radius(reach), self._drawn_extent())
+
+    def _drawn_extent(self) -> float:
+        """Half the side of the widest drawing, m, at least 1.05 m; infinite where one has a perspective."""
+        cameras = self.views.cameras[self.views.present]
+        if not bool(cameras.orthographic.all()):
+            return math.inf
+        return max(0.5 * cameras.width / float(cameras.focal.amin()), framing_radius(0.0))
 
     def _scene_for(self, size: int) -> Scene:
         """The scene for pictures of a size: a pixel of theirs covers as much as one of the drawings that it reads."""
