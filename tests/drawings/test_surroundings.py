@@ -117,6 +117,28 @@ def test_a_frame_and_a_scanners_edge_are_left_out(tmp_path):
         assert iou(found.rgba[..., 3], TRUTH[top : top + height, left : left + width]) > 0.98
 
 
+def test_an_outline_is_no_frame(tmp_path):
+    """A pale figure in a T pose whose ink alone differs clearly from the paper, and spans the picture."""
+    picture = Image.new("RGB", (SIZE, SIZE), (255, 255, 255))
+    draw = ImageDraw.Draw(picture)
+    points = [
+        (185, 10),
+        (215, 10),
+        (215, 100),
+        (395, 110),
+        (395, 130),
+        (215, 140),
+        (240, 390),
+        (160, 390),
+        (185, 140),
+    ]
+    points += [(5, 130), (5, 110), (185, 100)]
+    draw.polygon(points, fill=(225, 232, 240), outline=(20, 20, 20), width=3)
+    found = saved(tmp_path, picture)
+    assert not any("frame" in note for note in found.notes)
+    assert found.rgba.shape[:2] == (SIZE, SIZE) and found.rgba[250, 200, 3] == 1.0
+
+
 def test_a_gap_that_compression_blurs_stays_open(tmp_path):
     """JPEG at quality 60: the paper between the legs, 8 pixels wide, is paper; and so is what lies beside outlines."""
     found = saved(tmp_path, on_paper(), "drawing.jpg", quality=60)

@@ -37,11 +37,7 @@ def frame_window(ink: np.ndarray) -> tuple[slice, slice] | None:
     for part in regionprops(label(ink, connectivity=2)):
         up, start, down, end = part.bbox
         tall, wide = down - up, end - start
-        if (
-            tall >= FRAME_SPAN * height
-            and wide >= FRAME_SPAN * width
-            and part.area <= FRAME_AREA * tall * wide
-        ):
+        if tall >= FRAME_SPAN * height and wide >= FRAME_SPAN * width and _is_frame(part.image):
             inside = ndimage.binary_fill_holes(part.image) & ~part.image
             holes = regionprops(label(inside))
             if holes:
@@ -55,6 +51,15 @@ def frame_window(ink: np.ndarray) -> tuple[slice, slice] | None:
     if (top, bottom, left, right) == (0, height, 0, width):
         return None
     return slice(top + 1, bottom - 1), slice(left + 1, right - 1)
+
+
+def _is_frame(part: np.ndarray) -> bool:
+    """Whether a part (h, w) bool, in its box, is lines along all four of the box's sides and little else."""
+    if part.mean() > FRAME_AREA:
+        return False
+    depth = max(1, round(EDGE_WIDTH * min(part.shape)))
+    sides = (part[:depth].any(0), part[-depth:].any(0), part[:, :depth].any(1), part[:, -depth:].any(1))
+    return all(side.mean() >= FRAME_SPAN for side in sides)
 
 
 def cropped(drawing: Drawing, window: tuple[slice, slice]) -> Drawing:
