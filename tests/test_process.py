@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -86,3 +87,18 @@ def test_threads_do_not_spin_for_long_unless_the_user_says_so() -> None:
             [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
         )
         assert done.stdout.split() == ["False", expected]
+
+
+def test_what_a_thread_can_not_write_is_left_to_its_caller(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[type[BaseException]] = []
+    monkeypatch.setattr(threading, "excepthook", lambda failure: seen.append(failure.exc_type))
+    process.leave_disk_errors_to_callers()
+
+    def fail(error: Exception) -> None:
+        raise error
+
+    for error in (OSError(28, "No space left on device"), ValueError()):
+        thread = threading.Thread(target=fail, args=(error,))
+        thread.start()
+        thread.join()
+    assert seen == [ValueError]

@@ -1,5 +1,6 @@
 """Files that are there whole or not at all: written beside their place, then renamed into it; what may be read; and locks."""
 
+import errno
 import os
 import shutil
 import stat
@@ -116,6 +117,24 @@ def sync_folder(path: Path) -> None:
         pass
     finally:
         os.close(handle)
+
+
+@contextmanager
+def named_full_disk(folder: Path) -> Iterator[None]:
+    """Name the folder that is written to where the disk is full; libraries say no more than that.
+
+    Raises:
+        DataError: If the disk, the user's share of it, or what a process may write is used up.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            raise
+        raise DataError(
+            f"{folder}: can not be written to ({error.strerror}), expected room; what was written before stays. Make room, and"
+            " go on with ckpt_path=last."
+        ) from error
 
 
 @contextmanager

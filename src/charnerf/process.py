@@ -5,6 +5,7 @@
 
 import ctypes
 import os
+import threading
 from functools import cache
 
 FLOAT32_ERROR = 1e-5  # of a product, over the product of the absolute values; bfloat16 makes 1e-3
@@ -37,6 +38,17 @@ def keep_freed_memory() -> None:
     library.mallopt(mmap_max, 0)
     library.mallopt(trim_threshold, 1 << 30)
     library.mallopt(top_pad, 1 << 26)
+
+
+def leave_disk_errors_to_callers() -> None:
+    """Print no traceback where a thread can not write, as TensorBoard's on a full disk: its next caller raises the same error."""
+    others = threading.excepthook
+
+    def hook(failure: threading.ExceptHookArgs) -> None:
+        if not issubclass(failure.exc_type, OSError):
+            others(failure)
+
+    threading.excepthook = hook
 
 
 @cache

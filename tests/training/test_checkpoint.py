@@ -1,6 +1,8 @@
 """Which checkpoint a run goes on from, and what happens where it is broken, another's, or can not be written."""
 
 import logging
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,7 @@ import torch
 
 from charnerf.capture.procedural_data import generate_dataset
 from charnerf.errors import ConfigError, DataError
+from charnerf.files import named_full_disk
 from charnerf.inference.checkpoint_file import read_checkpoint, write_checkpoint
 from charnerf.inference.weights import load_config
 from charnerf.training import run as run_module
@@ -59,7 +62,9 @@ def test_where_both_are_broken_or_there_is_no_other_that_is_said(tmp_path):
     write_steps(tmp_path, last=8, previous=6)
     for name in ("last", "previous"):
         flip(checkpoints / f"{name}.ckpt")
-    with pytest.raises(DataError, match=r"previous\.ckpt: can not be read"):
+    with pytest.raises(
+        DataError, match=r"last\.ckpt: can not be read.*previous\.ckpt: can not be read.*Remove both"
+    ):
         find_checkpoint("last", tmp_path)
     with pytest.raises(DataError, match=r"last\.ckpt: can not be read"):
         find_checkpoint(str(checkpoints / "last.ckpt"), tmp_path)
@@ -164,3 +169,28 @@ def test_a_run_that_can_not_write_its_checkpoint_fails(figure_dataset, tmp_path,
     with pytest.raises(DataError, match=r"checkpoints/\w+\.ckpt: the checkpoint can not be written"):
         run_training(small_runs.smoke_config(figure_dataset, *SMALL), tmp_path)
     assert not (tmp_path / "weights.safetensors").exists()
+
+
+def test_a_disk_that_takes_no_checkpoint_is_one_message_and_status_1(figure_dataset, tmp_path):
+    """The kernel refuses every file above 100 kB."""
+    resource = pytest.importorskip("resource")
+    settings = ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={figure_dataset}", *SMALL]
+    done = subprocess.run(
+        [sys.executable, "-m", "charnerf", "train", *settings, f"hydra.run.dir={tmp_path / 'run'}"],
+        capture_output=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
+    )
+    assert done.returncode == 1
+    errors = [line for line in done.stderr.decode().splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1 and "the checkpoint can not be written (File too large)" in errors[0]
+    assert b"Traceback" not in done.stderr
+    assert not list((tmp_path / "run/checkpoints").iterdir())
+
+
+def test_a_full_disk_is_named_by_its_folder(tmp_path):
+    with pytest.raises(DataError, match=r"run: can not be written to \(No space left on device\)"):
+        with named_full_disk(tmp_path / "run"):
+            raise OSError(28, "No space left on device")
+    with pytest.raises(FileNotFoundError), named_full_disk(tmp_path):
+        (tmp_path / "gone").read_bytes()

@@ -65,6 +65,19 @@ def test_a_run_that_is_stopped_goes_on_as_the_straight_one(
     assert [row.split(",")[0] for row in curves[0]] == [row.split(",")[0] for row in curves[1]]
 
 
+def test_within_slurm_the_answer_is_the_same(figure_dataset, tmp_path, monkeypatch):
+    """Lightning would write a checkpoint of its own, ask for a requeue and leave SIGTERM unanswered."""
+    job = {"NTASKS": "1", "JOB_ID": "7", "JOB_NAME": "mine", "PROCID": "0", "LOCALID": "0", "NODEID": "0"}
+    for key, value in (job | {"NTASKS_PER_NODE": "1", "NNODES": "1"}).items():
+        monkeypatch.setenv(f"SLURM_{key}", value)
+    stopped = small_runs.assemble(small_runs.smoke_config(figure_dataset, *SMALL), tmp_path)
+    stopped.trainer.callbacks.insert(1, Asking(step=1))
+    with pytest.raises(Stopped), listening(), held():
+        stopped.fit()
+    assert sorted(file.name for file in (tmp_path / "checkpoints").iterdir()) == ["last.ckpt"]
+    assert read_checkpoint(tmp_path / "checkpoints/last.ckpt")["global_step"] == 2
+
+
 def test_a_run_that_is_stopped_in_its_evaluation_is_trained(figure_dataset, tmp_path, monkeypatch, caplog):
     done = []
 

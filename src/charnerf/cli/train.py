@@ -10,7 +10,12 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.interruption import Stopped, listening
-from charnerf.process import keep_freed_memory, limit_spinning, use_fastest_products
+from charnerf.process import (
+    keep_freed_memory,
+    leave_disk_errors_to_callers,
+    limit_spinning,
+    use_fastest_products,
+)
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -97,6 +102,7 @@ def run_job(cfg: "DictConfig") -> None:
     job = HydraConfig.get()
     validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
     folder = Path(job.runtime.output_dir)
+    leave_disk_errors_to_callers()
     if job.mode is RunMode.MULTIRUN:
         run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder)
     else:

@@ -161,7 +161,10 @@ def _last_of(folder: Path) -> Path | None:
             problem = str(error)
     if not previous.is_file():
         raise DataError(f"{problem} There is none before it; remove it, and the run begins again.")
-    read_checkpoint(previous)
+    try:
+        read_checkpoint(previous)
+    except DataError as error:
+        raise DataError(f"{problem} {error} Remove both, and the run begins again.") from error
     if last.is_file():
         last.replace(last.with_name(BROKEN))
         problem += f" It is {BROKEN} now."

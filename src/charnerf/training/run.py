@@ -11,7 +11,7 @@ from omegaconf import DictConfig
 
 from charnerf.data.base import AbstractData
 from charnerf.data.datamodule import MixedDataModule
-from charnerf.files import write_text
+from charnerf.files import named_full_disk, write_text
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.inference.weights import save_config, save_weights
 from charnerf.interruption import Stopped, held
@@ -60,7 +60,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     module = build_module(cfg, model, renderer, losses, clock)
     data = build_data(cfg, root, model, clock, needs)
     threads = ThreadTuner(adapts=may_choose(budget_seconds=cfg.budget.seconds))
-    with held():  # until a checkpoint, or the weights, are whole
+    with held(), named_full_disk(folder):  # until a checkpoint, or the weights, are whole
         trainer = build_trainer(cfg, folder, clock, losses.names, threads, identity)
         if trainer.is_global_zero:
             log_hyperparameters(trainer, cfg, model)
@@ -70,7 +70,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
             save_weights(folder / "weights.safetensors", model, cfg)
             save_config(folder, cfg)
     if trainer.is_global_zero:
-        with _trained(folder):
+        with _trained(folder), named_full_disk(folder):
             finish_run(
                 cfg,
                 folder,
