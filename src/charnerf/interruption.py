@@ -7,13 +7,16 @@ or 130. Work that has to come to a point of its own first holds signals back (`h
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from types import FrameType
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+_PATIENCE = 60.0  # seconds for a last checkpoint
 _NOTE = b"\nstopping as soon as what is at hand is whole; a second signal ends at once.\n"
 
 
@@ -117,6 +120,23 @@ def leave_signals_to_parent() -> None:
     """Ignore both signals in a worker process: who asks a group of processes to end is answered by their parent."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
+
+
+@cache
+def end_with_parent() -> None:
+    """Ask this process to end once its parent has, however that ended; what does not end then is ended."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os.kill(os.getpid(), signal.SIGTERM)
+        end = time.monotonic() + _PATIENCE
+        while is_listening() and time.monotonic() < end:
+            time.sleep(0.1)
+        os._exit(128 + signal.SIGTERM)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _on_signal(number: int, _: FrameType | None) -> None:

@@ -14,6 +14,7 @@ import torch
 from charnerf.inference.checkpoint_file import read_checkpoint
 from charnerf.interruption import Stopped, held, listening
 from charnerf.training import run
+from charnerf.training.cells import cells_of
 from support import small_runs
 
 SMALL = ("encoder=single", "schedule=two_phase", "scale.steps=8", "validation.times=2")
@@ -109,6 +110,13 @@ def start(dataset: Path, folder: Path, *more: str) -> subprocess.Popen[bytes]:
     )
 
 
+def await_file(process: subprocess.Popen[bytes], file: Path, pattern: str | None = None) -> None:
+    end = time.monotonic() + 300
+    while not (file.is_file() if pattern is None else any(file.glob(pattern))):
+        assert process.poll() is None and time.monotonic() < end
+        time.sleep(0.05)
+
+
 def children(process: int) -> list[int]:
     file = Path(f"/proc/{process}/task/{process}/children")
     return [int(one) for one in file.read_text().split()] if file.is_file() else []
@@ -126,10 +134,7 @@ def test_the_command_ends_with_its_status_and_its_workers(figure_dataset, tmp_pa
     long = ("scale.steps=100000", "validation.times=20000", "batches.workers=1")
     process = start(figure_dataset, tmp_path / "run", *long)
     last = tmp_path / "run/checkpoints/last.ckpt"
-    end = time.monotonic() + 300
-    while not last.is_file():
-        assert process.poll() is None and time.monotonic() < end
-        time.sleep(0.05)
+    await_file(process, last)
     workers = children(process.pid)
     os.killpg(process.pid, number)
     out, err = process.communicate(timeout=120)
@@ -137,3 +142,47 @@ def test_the_command_ends_with_its_status_and_its_workers(figure_dataset, tmp_pa
     assert str(last) in out.decode() + err.decode() and b"Traceback" not in err
     assert read_checkpoint(last)["global_step"] >= 5
     assert not any(is_alive(worker) for worker in workers)
+
+
+def test_workers_end_with_a_training_that_is_killed(figure_dataset, tmp_path):
+    process = start(
+        figure_dataset, tmp_path / "run", "scale.steps=100000", "validation.times=20000", "batches.workers=2"
+    )
+    await_file(process, tmp_path / "run/checkpoints/last.ckpt")
+    workers = children(process.pid)
+    process.kill()
+    process.communicate(timeout=60)  # until nobody has its output open
+    assert process.returncode == -signal.SIGKILL and len(workers) == 2
+    assert not any(is_alive(worker) for worker in workers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("launcher", [None, "joblib"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_a_grid_ends_with_its_processes_and_goes_on(figure_dataset, tmp_path, number, launcher):
+    """The command alone gets the signal."""
+    more = []
+    if launcher is not None:
+        pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+        more = ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]
+    grid = tmp_path / "grid"
+    command = [
+        *more,
+        "-m",
+        "seed=0,1",
+        "encoder=single",
+        "scale.steps=60",
+        "validation.times=30",
+        "scale.eval_views=1",
+    ]
+    command.append(f"hydra.sweep.dir={grid}")
+    process = start(figure_dataset, tmp_path, *command)
+    await_file(process, grid, "*/checkpoints/last.ckpt")
+    process.send_signal(number)
+    _, err = process.communicate(timeout=120)  # until no process has its output open
+    assert process.returncode == (-number if number == signal.SIGKILL else 128 + number), err.decode()
+    assert any(cell.state == "interrupted" for cell in cells_of(grid))
+    again = start(figure_dataset, tmp_path, *command)
+    _, err = again.communicate(timeout=600)
+    assert again.returncode == 0, err.decode()
+    assert [cell.state for cell in cells_of(grid)] == ["done", "done"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from charnerf.cli.messages import say
-from charnerf.interruption import Stopped, listening
+from charnerf.interruption import Stopped, end_with_parent, is_listening, listening
 from charnerf.process import (
     keep_freed_memory,
     leave_disk_errors_to_callers,
@@ -89,6 +89,13 @@ def _train(arguments: list[str], conf: Path) -> None:
 
 def run_job(cfg: "DictConfig") -> None:
     """One job, perhaps in a process that a launcher began: training, evaluation, report."""
+    if not is_listening():  # a launcher's
+        end_with_parent()
+    with listening():
+        _run_job(cfg)
+
+
+def _run_job(cfg: "DictConfig") -> None:
     keep_freed_memory()
     use_fastest_products()
     from hydra.core.hydra_config import HydraConfig

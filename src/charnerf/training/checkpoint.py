@@ -93,7 +93,8 @@ class LastCheckpoint(Checkpoint):
 
     def _stop(self, trainer: L.Trainer) -> None:
         log.warning(
-            "Stopped after step %d; the checkpoint is %s. The same command goes on with hydra.run.dir=%s ckpt_path=last",
+            "Stopped after step %d; the checkpoint is %s. The same command goes on, a single run's with hydra.run.dir=%s"
+            " ckpt_path=last",
             trainer.global_step,
             self.file,
             self.file.parent.parent,

@@ -107,7 +107,8 @@ def _trained(folder: Path) -> Iterator[None]:
         yield
     except Stopped:
         log.warning(
-            "Stopped after training; the weights are %s. The same command evaluates them with hydra.run.dir=%s ckpt_path=last",
+            "Stopped after training; the weights are %s. The same command evaluates them, a single run's with"
+            " hydra.run.dir=%s ckpt_path=last",
             folder / "weights.safetensors",
             folder,
         )
