@@ -1,7 +1,9 @@
 """A grid by its command: killed cells go on, failed ones are listed, by every launcher."""
 
 import importlib.util
+import json
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -102,9 +104,15 @@ LAUNCHERS = {
 def test_a_grid_with_a_failing_cell(figure_dataset, tmp_path, package):
     if package != "basic" and importlib.util.find_spec(f"hydra_plugins.{package}") is None:
         pytest.skip(f"{package} is not installed")
+    root = shutil.copytree(figure_dataset, tmp_path / "set")
+    content = json.loads((root / "dataset.json").read_text())
+    content["splits"]["broken"] = content["splits"].pop("train")
+    (root / "dataset.json").write_text(json.dumps(content))
+    for picture in root.glob("[lm]*/images/*.png"):  # noticed when it is opened, not before
+        picture.write_bytes(b"")
     command = [
-        *(sys.executable, str(ROOT / "train.py"), "-m", "splits.train=[nope],[val]", "seed=3"),
-        *("data=folder", f"data.root={figure_dataset}", "trainer=cpu", "encoder=single", "scale=smoke"),
+        *(sys.executable, str(ROOT / "train.py"), "-m", "splits.train=[broken],[val]", "seed=3"),
+        *("data=folder", f"data.root={root}", "trainer=cpu", "encoder=single", "scale=smoke"),
         *("scale.steps=2", "scale.eval_views=1", "validation.views=1", *LAUNCHERS[package]),
     ]
     first = subprocess.run(
@@ -115,8 +123,8 @@ def test_a_grid_with_a_failing_cell(figure_dataset, tmp_path, package):
     (grid,) = (tmp_path / "outputs/grid").iterdir()
     assert grid.name.startswith("splits.train-") and (grid / "report.md").is_file()
     states = {path.parent.name.rpartition("-")[0]: path for path in grid.glob("*/cell.json")}
-    assert sorted(states) == ["splits.train-[nope]", "splits.train-[val]"]
-    error = states["splits.train-[nope]"].parent / "error.txt"
+    assert sorted(states) == ["splits.train-[broken]", "splits.train-[val]"]
+    error = states["splits.train-[broken]"].parent / "error.txt"
     assert "Traceback" in error.read_text()
     metrics = states["splits.train-[val]"].parent / "metrics.json"
     before = metrics.stat().st_mtime_ns
