@@ -101,6 +101,17 @@ def test_a_crop_holds_its_figure_alone():
         assert found.right - found.left == pytest.approx(box[2] - box[0], abs=3)
 
 
+def test_a_figure_that_the_border_cuts_off_is_left_aside():
+    """A neighbour of the turnaround, half of it on the sheet; two figures at the border alone are taken as they are."""
+    pixels, boxes = sheet(["front", "side", "back"], extras=False)
+    middle = (boxes[0][0] + boxes[0][2]) // 2
+    found = find_figures(drawing_from_array(pixels[:, middle:], "sheet"))
+    assert len(found.figures) == 2 and found.left_aside[0].reason == "cut off by the border"
+    assert near(found.figures[0].box, [boxes[1][0] - middle, boxes[1][1], boxes[1][2] - middle, boxes[1][3]])
+    tight = pixels[:, boxes[0][0] : boxes[1][2]]
+    assert len(find_figures(drawing_from_array(tight, "sheet")).figures) == 2
+
+
 def test_an_empty_page_is_refused():
     with pytest.raises(DataError, match="page: found nothing on its background"):
         find_figures(drawing_from_array(np.full((300, 300, 3), 240, np.uint8), "page"))

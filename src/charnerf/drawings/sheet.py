@@ -77,7 +77,7 @@ def find_figures(drawing: Drawing) -> Sheet:
         raise DataError(
             f"{drawing.name}: found nothing on its background, expected figures of a character. Check the file."
         )
-    chosen, reasons = _choose(regions)
+    chosen, reasons = _without_cut_off(regions, *_choose(regions), ink.shape)
     if len(chosen) > MOST_FIGURES:
         raise DataError(
             f"{drawing.name}: found {len(chosen)} figures, expected at most {MOST_FIGURES}: crop it to the views of one"
@@ -160,6 +160,22 @@ def _choose(regions: Sequence[object]) -> tuple[list[int], dict[int, str]]:
             smaller = heights[index] < np.median(heights[best]) if best else True
             reasons[index] = "a detail or text" if smaller else "a close-up"
     return best, reasons
+
+
+def _without_cut_off(
+    regions: Sequence[object], chosen: list[int], reasons: dict[int, str], shape: tuple[int, ...]
+) -> tuple[list[int], dict[int, str]]:
+    """Figures that the sheet's border cuts off are none, where at least two whole ones stay."""
+    height, width = shape[:2]
+    boxes = {i: regions[i].bbox for i in chosen}  # type: ignore[attr-defined]
+    cut = [
+        i
+        for i, (top, left, down, right) in boxes.items()
+        if not (top and left and down < height and right < width)
+    ]
+    if not cut or len(chosen) - len(cut) < 2:
+        return chosen, reasons
+    return [i for i in chosen if i not in cut], reasons | dict.fromkeys(cut, "cut off by the border")
 
 
 def _owners(regions: Sequence[object], chosen: Sequence[int]) -> dict[int, int]:
