@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from charnerf.cli.train import main
+from charnerf.interruption import leave
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], conf=Path(__file__).resolve().parent / "conf"))
+    leave(main(sys.argv[1:], conf=Path(__file__).resolve().parent / "conf"))

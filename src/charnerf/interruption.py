@@ -4,8 +4,10 @@ A door listens (`listening`); then a signal raises `Stopped`, which cleans up as
 or 130. Work that has to come to a point of its own first holds signals back (`held`).
 """
 
+import logging
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -13,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import FrameType
+from typing import NoReturn
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
@@ -114,6 +117,20 @@ def held() -> Iterator[None]:
 def requested() -> int | None:
     """Number of the signal that came; None before."""
     return _interruption.received
+
+
+def leave(status: int) -> NoReturn:
+    """End the process with an exit status; after a signal at once, when all is cleaned up.
+
+    Python joins its worker processes when it ends, and waits for ever for one that leaves signals to its parent and hangs on
+    a batch that nobody takes. Such workers end when their parent has (`end_with_parent`, and torch's own watch).
+    """
+    if status in {128 + number for number in SIGNALS}:
+        logging.shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 def leave_signals_to_parent() -> None:

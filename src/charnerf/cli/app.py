@@ -25,7 +25,7 @@ from charnerf.cli import (
 )
 from charnerf.cli.messages import say
 from charnerf.errors import CharNeRFError, ConfigError
-from charnerf.interruption import Stopped, listening
+from charnerf.interruption import Stopped, leave, listening
 from charnerf.process import limit_spinning
 
 FAILED, WRONG_CALL = 1, 2
@@ -74,7 +74,7 @@ def _options(
 def main() -> None:
     """Run a command and leave with its exit status."""
     limit_spinning()
-    sys.exit(run(sys.argv[1:]))
+    leave(run(sys.argv[1:]))
 
 
 def _printable(text: str) -> str:
