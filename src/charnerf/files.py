@@ -33,6 +33,20 @@ def open_regular(path: Path) -> BinaryIO:
     return path.open("rb")
 
 
+def read_bytes(path: Path, *, most: int) -> bytes:
+    """Content of a file.
+
+    Raises:
+        DataError: If it is no file, or larger than `most` bytes.
+        OSError: If it can not be opened.
+    """
+    with open_regular(path) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise DataError(f"{path}: found more than {most} bytes, expected fewer.")
+    return content
+
+
 def read_text(path: Path, *, most: int = MOST_TEXT) -> str:
     """Content of a text file in UTF-8.
 
@@ -41,11 +55,7 @@ def read_text(path: Path, *, most: int = MOST_TEXT) -> str:
         OSError: If it can not be opened.
         UnicodeDecodeError: If it is not UTF-8.
     """
-    with open_regular(path) as file:
-        content = file.read(most + 1)
-    if len(content) > most:
-        raise DataError(f"{path}: found more than {most} bytes, expected fewer.")
-    return content.decode("utf-8")
+    return read_bytes(path, most=most).decode("utf-8")
 
 
 def inside(folder: Path, name: str, where: str) -> Path:

@@ -11,7 +11,7 @@ import trimesh
 from PIL import Image
 
 from charnerf.errors import DataError
-from charnerf.files import inside, open_regular
+from charnerf.files import inside, read_bytes
 from charnerf.pictures import check_pixels, open_picture, readable_formats
 
 MOST_BYTES = 2**30  # of a file, or of one that it names
@@ -100,11 +100,7 @@ def read_whole(file: Path) -> bytes:
     Raises:
         DataError: If it is larger, or no file.
     """
-    with open_regular(file) as stream:
-        content = stream.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise DataError(f"{file}: found more than {MOST_BYTES} bytes, expected fewer.")
-    return content
+    return read_bytes(file, most=MOST_BYTES)
 
 
 def check_picture(content: bytes, name: str) -> None:

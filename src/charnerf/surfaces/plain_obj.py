@@ -44,8 +44,6 @@ def plain_faces(content: bytes) -> bytes:
             lines[number] = " ".join(("f", *faces[number]))
     polygons = {number: corners for number, corners in faces.items() if len(corners) > 3}
     indices = [np.array([int(corner.split("/")[0]) - 1 for corner in each]) for each in polygons.values()]
-    if indices and max(each.max() for each in indices) >= len(positions):
-        raise DataError(f"a face names a vertex that is not one of {len(positions)}; export it again.")
     vertices = np.array(positions, dtype=np.float64).reshape(-1, 3)
     for (number, corners), triangles in zip(polygons.items(), triangulate(vertices, indices), strict=True):
         lines[number] = "\n".join("f " + " ".join(corners[place] for place in each) for each in triangles)

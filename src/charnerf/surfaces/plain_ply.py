@@ -88,8 +88,6 @@ def plain_faces(content: bytes) -> bytes:
     rows, polygons = zip(
         *((row, each) for row, each in zip(rows, polygons, strict=True) if len(each) > 2), strict=True
     )
-    if min(each.min() for each in polygons) < 0 or max(each.max() for each in polygons) >= len(vertices):
-        raise DataError(f"a face names a vertex that is not one of {len(vertices)}; export it again.")
     cut = [
         [_of_corners(value, len(polygon), triangle) for value in row]
         for row, polygon, triangles in zip(rows, polygons, triangulate(vertices, polygons), strict=True)

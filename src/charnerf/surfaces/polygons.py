@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from charnerf.errors import DataError
+
 _QUAD = np.array(((0, 1, 2), (2, 3, 0)))
 
 
@@ -18,8 +20,10 @@ def triangulate(vertices: np.ndarray, polygons: Sequence[np.ndarray]) -> list[np
         Of each polygon the corners of its triangles, (m, 3), as places in the polygon: 0 to k - 1.
 
     Raises:
-        IndexError: If a vertex is not there.
+        DataError: If a vertex is not there.
     """
+    if any(polygon.min() < 0 or polygon.max() >= len(vertices) for polygon in polygons):
+        raise DataError(f"a face names a vertex that is not one of {len(vertices)}; export it again.")
     triangles: list[np.ndarray] = [np.zeros((0, 3), np.int64)] * len(polygons)
     sizes = np.array([len(polygon) for polygon in polygons])
     for size in np.unique(sizes):
