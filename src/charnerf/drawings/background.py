@@ -36,7 +36,8 @@ class Background:
         distance: CIELAB distance of each pixel from the background's colour there, (H, W).
         tolerance: Distance up to which a pixel is of that colour.
         rgb: Its colour, (3,), in [0, 1].
-        lab: Its colour everywhere, (H, W, 3), CIELAB.
+        paper: Its colour everywhere, (H, W, 3), CIELAB.
+        lab: The drawing on white, (H, W, 3), CIELAB.
         is_checkered: Whether it is the checkerboard by which programs show transparency, drawn.
     """
 
@@ -44,8 +45,9 @@ class Background:
     distance: np.ndarray
     tolerance: float
     rgb: np.ndarray
+    paper: np.ndarray
     lab: np.ndarray
-    is_checkered: bool = False
+    is_checkered: bool
 
 
 def find_background(drawing: Drawing) -> Background:
@@ -58,47 +60,48 @@ def find_background(drawing: Drawing) -> Background:
     lab = rgb2lab(rgb)
     ring = _ring(lab.shape[:2])
     checkers = find_checkerboard(lab)
-    if checkers is not None:
-        distance = np.linalg.norm(lab - checkers, axis=-1)
+    if checkers is None:
+        inlier = _commonest(lab[ring])
+        plain = float(inlier.mean())
+        if plain < PLAIN_SHARE:
+            raise DataError(
+                f"{drawing.name}: found a border of which only {100 * plain:.0f} % is of one colour, expected a "
+                "plain background or "
+                "alpha. Paint the background in one colour, or save the figure with a transparent one."
+            )
+        paper = _fit_background(lab, ring, inlier)
+        distance = np.linalg.norm(lab - paper, axis=-1)
+    else:
+        inlier, paper = np.ones(int(ring.sum()), bool), checkers
+        distance = np.linalg.norm(lab - paper, axis=-1)
         distance[_near_changes(checkers)] *= 0.25  # where cells meet, their colours may be mixed
-        return _grown(drawing, ring, distance, checkers, rgb, np.ones(int(ring.sum()), bool), True)
-    inlier = _commonest(lab[ring])
-    plain = float(inlier.mean())
-    if plain < PLAIN_SHARE:
-        raise DataError(
-            f"{drawing.name}: found a border of which only {100 * plain:.0f} % is of one colour, expected a "
-            "plain background or "
-            "alpha. Paint the background in one colour, or save the figure with a transparent one."
-        )
-    background = _fit_background(lab, ring, inlier)
-    return _grown(drawing, ring, np.linalg.norm(lab - background, axis=-1), background, rgb, inlier, False)
-
-
-def _grown(
-    drawing: Drawing,
-    ring: np.ndarray,
-    distance: np.ndarray,
-    lab: np.ndarray,
-    rgb: np.ndarray,
-    inlier: np.ndarray,
-    is_checkered: bool,
-) -> Background:
-    """What is connected to the border and near enough to the background's colour there."""
     noise = np.percentile(distance[ring][inlier], 99.0)
     tolerance = float(np.clip(1.5 * noise, LEAST_TOLERANCE, MODE_TOLERANCE))
+    return Background(
+        mask=_connected(distance, tolerance, ring, lossy=drawing.lossy),
+        distance=distance,
+        tolerance=tolerance,
+        rgb=np.median(rgb[ring][inlier], axis=0),
+        paper=paper,
+        lab=lab,
+        is_checkered=checkers is not None,
+    )
+
+
+def _connected(distance: np.ndarray, tolerance: float, ring: np.ndarray, *, lossy: bool) -> np.ndarray:
+    """What is near enough to the background's colour, by its distance (H, W), and connected to the border, (H, W) bool."""
     near = distance <= tolerance
-    if drawing.lossy:  # beside strong edges compression rings, by a share of their contrast
+    if lossy:  # beside strong edges compression rings, by a share of their contrast
         near |= distance <= RINGING * ndimage.maximum_filter(distance, 2 * BLOCK + 1)
     regions = label(near, connectivity=1)
     outside = np.unique(regions[ring & (regions > 0)])
     mask = np.isin(regions, outside[outside > 0])
     # a faint halo goes too, but only so far: light clothes must not leak away through a faint outline
-    mask = ndimage.binary_dilation(
+    return ndimage.binary_dilation(
         mask,
         mask=mask | (distance <= max(tolerance, HALO_TOLERANCE)),
-        iterations=HALO_WIDTH[drawing.lossy],
+        iterations=HALO_WIDTH[lossy],
     )
-    return Background(mask, distance, tolerance, np.median(rgb[ring][inlier], axis=0), lab, is_checkered)
 
 
 def find_checkerboard(lab: np.ndarray) -> np.ndarray | None:

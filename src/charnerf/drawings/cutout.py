@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
-from skimage.color import rgb2lab
 from skimage.measure import label
 
 from charnerf.drawings.background import Background, find_background
@@ -114,7 +113,7 @@ def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
             "expected a figure on a plain background. Leave a margin, or save it with a transparent "
             "background."
         )
-    shadow = shadow_on_paper(rgb2lab(on_white(drawing.rgba)), background.lab, figure)
+    shadow = shadow_on_paper(background.lab, background.paper, figure)
     if shadow.any():
         notes.append(SHADOW_NOTE)
         figure &= ~(shadow | _fenced_in(background, figure, shadow))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -145,6 +146,10 @@ class Hero:
 
         The hull counts with a margin, where it is narrower or a drawing has a perspective; at least 1.05 m.
         """
+        return self._radius
+
+    @cached_property
+    def _radius(self) -> float:
         bounds = self.scene.bounds
         hull, box_min = bounds.hull, bounds.box_min
         if hull is None:

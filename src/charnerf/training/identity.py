@@ -1,6 +1,7 @@
 """What a checkpoint says about the run that wrote it, and what has to be the same to go on from it."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
@@ -50,7 +51,7 @@ class RunIdentity(L.Callback):
     """
 
     def __init__(self, cfg: DictConfig, data: Mapping[str, str]) -> None:
-        self.config, self.data = settings_of(cfg), dict(data)
+        self.config, self.data = _settings(cfg), dict(data)
 
     def on_save_checkpoint(
         self, trainer: L.Trainer, pl_module: L.LightningModule, checkpoint: dict[str, Any]
@@ -64,42 +65,57 @@ def data_of(cfg: DictConfig, root: Path) -> dict[str, str]:
     return {split: training_digest(root, split) for split in [*cfg.splits.train, cfg.splits.val]}
 
 
-def check_config(file: Path, cfg: DictConfig) -> None:
-    """Check that a checkpoint is of a run with this config, but for what may change.
+@dataclass(frozen=True)
+class WrittenRun:
+    """What a checkpoint says about the run that wrote it.
+
+    Attributes:
+        file: The checkpoint.
+        config: Its settings by full keys.
+        data: Digests of its splits.
+    """
+
+    file: Path
+    config: Mapping[str, Setting]
+    data: Mapping[str, str]
+
+    def check_config(self, cfg: DictConfig) -> None:
+        """Check that it had this config, but for what may change.
+
+        Raises:
+            ConfigError: Names every key that differs.
+        """
+        _compare(self.file, self.config, _settings(cfg), "settings")
+
+    def check_data(self, data: Mapping[str, str]) -> None:
+        """Check that it was trained on this data set.
+
+        Raises:
+            ConfigError: Names the splits that differ.
+        """
+        there, here = (
+            {f"digest of split {split}": digest for split, digest in one.items()} for one in (self.data, data)
+        )
+        _compare(self.file, there, here, "a data set")
+
+
+def written_run(file: Path) -> WrittenRun:
+    """Read what a checkpoint says about its run.
 
     Raises:
-        ConfigError: Names every key that differs; or the checkpoint does not say of which run it is.
+        ConfigError: If it does not say of which run it is.
         DataError: If it can not be read.
     """
-    _compare(file, _run_of(file)["config"], settings_of(cfg), "settings")
-
-
-def check_data(file: Path, data: Mapping[str, str]) -> None:
-    """Check that a checkpoint is of a run on this data set.
-
-    Raises:
-        ConfigError: Names the splits that differ.
-        DataError: If it can not be read.
-    """
-    there, here = (
-        {f"digest of split {split}": digest for split, digest in one.items()}
-        for one in (_run_of(file)["data"], data)
-    )
-    _compare(file, there, here, "a data set")
-
-
-def _run_of(file: Path) -> Mapping[str, Mapping[str, Setting]]:
-    """What a checkpoint says about its run."""
     run = read_checkpoint(file).get(KEY)
     if not isinstance(run, Mapping) or run.get("format") != FORMAT:
         raise ConfigError(
             f"ckpt_path: {file} does not say of which run it is, expected {FORMAT}; begin with its weights by"
             f" start_from={file}."
         )
-    return run
+    return WrittenRun(file, run["config"], run["data"])
 
 
-def settings_of(cfg: DictConfig) -> dict[str, Setting]:
+def _settings(cfg: DictConfig) -> dict[str, Setting]:
     """Everything that a config says, by full keys; the order of a list of parts counts, so it is a setting too."""
     plain = OmegaConf.to_container(cfg, resolve=True)
     assert isinstance(plain, dict)

@@ -22,7 +22,7 @@ from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.clock import RunClock
 from charnerf.training.data import build_data
 from charnerf.training.finish import finish_run
-from charnerf.training.identity import RunIdentity, check_config, check_data, data_of
+from charnerf.training.identity import RunIdentity, WrittenRun, data_of, written_run
 from charnerf.training.module import TrainingModule
 from charnerf.training.start import begin
 from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
@@ -48,13 +48,14 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     source.check_splits(**cfg.splits)
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
-    if checkpoint is not None:
-        check_config(checkpoint, cfg)
+    before = None if checkpoint is None else written_run(checkpoint)
+    if before is not None:
+        before.check_config(cfg)
     losses, needs = build_losses(cfg)
     model = build_model(cfg)
     start = begin(model, cfg) if checkpoint is None else None
     root = source.prepare(depth=needs.depth)
-    identity = _identity(cfg, folder, root, checkpoint)
+    identity = _identity(cfg, folder, root, before)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = build_module(cfg, model, renderer, losses, clock)
@@ -83,13 +84,13 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
             )
 
 
-def _identity(cfg: DictConfig, folder: Path, root: Path, checkpoint: Path | None) -> RunIdentity:
+def _identity(cfg: DictConfig, folder: Path, root: Path, before: WrittenRun | None) -> RunIdentity:
     """What the run's checkpoints say of it; its config is written if it is new, else with the next checkpoint."""
     identity = RunIdentity(cfg, data_of(cfg, root))
-    if checkpoint is None:
+    if before is None:
         save_config(folder, cfg)
     else:
-        check_data(checkpoint, identity.data)
+        before.check_data(identity.data)
     return identity
 
 
