@@ -137,7 +137,7 @@ def test_a_character_is_a_name(name: str, data: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "view", ["../../evil", "/tmp/evil", "a/b", "..", "", "x" * 300, "a\0b", "\ud800", "a\nb", "a\\b"]
+    "view", ["../../evil", "/evil", "a/b", "..", "", "x" * 300, "a\0b", "\ud800", "a\nb", "a\\b"]
 )
 def test_views_are_no_paths(view: str, data: Path, tmp_path: Path) -> None:
     change(

@@ -22,7 +22,7 @@ def command(
         typer.Option(
             min=0,
             max=3,
-            help="How far views disagree: 0 as captured, 1 a careful hand, 2 limbs off by 10 degrees, 3 by 30 degrees.",
+            help="How far views disagree: 0 as captured, 1 in place and size, 2 limbs off by 10 degrees, 3 by 30 degrees.",
         ),
     ] = 1,
 ) -> None:

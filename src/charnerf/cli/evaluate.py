@@ -57,7 +57,7 @@ Drawn = Annotated[
     typer.Option(
         "--drawn",
         metavar="LEVEL[:SEED]",
-        help="Draw the source views anew, disagreeing: 1 a careful hand, 2 limbs off by 10 degrees, 3 by 30 degrees.",
+        help="Draw the source views anew, disagreeing: 1 in place and size, 2 limbs off by 10 degrees, 3 by 30 degrees.",
     ),
 ]
 NearestFrom = Annotated[

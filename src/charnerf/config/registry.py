@@ -100,7 +100,5 @@ ARGUMENTS: Mapping[str, Mapping[str, str]] = {  # groups of the arguments that a
     "lightning.Trainer": {"profiler": "profiler", "strategy": "strategy", "plugins": "plugin"},
 }
 
-COMPLETED_LATER = (
-    "optimizer",
-    "surface",
-)  # groups whose options say `_partial_`: a run brings the last argument
+# groups whose options say `_partial_`: a run brings the last argument
+COMPLETED_LATER = ("optimizer", "surface")

@@ -15,7 +15,6 @@ from torch.nn import functional as F
 from charnerf.types import Hull, TensorRecord
 
 POOL = 2  # cells of the hull a side of a cell here
-NUM_CHANNELS = 7
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from charnerf.errors import DataError
 from charnerf.evaluation.scores import METRIC_KEYS
 
 _LARGEST = 1e30  # of any number
-_NUMBERS = (*METRIC_KEYS, "num_characters", "num_views", "haze", "peak_memory_mib")
+_NUMBERS = (*METRIC_KEYS, "num_characters", "num_views", "peak_memory_mib")
 _TEXTS = ("split", "data_root")
 _ROWS = ("by_azimuth", "by_elevation", "by_source_angle")  # lists of figures
 _FIGURES = ("seconds", "left_out", "peak_memory_by_stage_mib")
