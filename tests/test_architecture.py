@@ -16,8 +16,8 @@ MAX_FUNCTION_LINES = 50
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
     ("errors", "interruption"),
-    ("types", "checks", "schedule", "files", "markdown"),
-    ("pictures",),
+    ("types", "checks", "schedule", "files", "markdown", "wording"),
+    ("pictures", "viewer"),
     ("process",),
     ("geometry",),
     ("scene",),
@@ -27,7 +27,8 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("capture", "evaluation"),
     ("drawings",),
     ("inference",),
-    ("finetuning", "reporting"),
+    ("reporting",),
+    ("finetuning",),
     ("reconstruction", "training"),
     ("bench", "stability"),
     ("cli", "__init__"),
