@@ -43,7 +43,15 @@ def test_the_folder_loads_as_the_adapted_model(model, person_views, tmp_path):
     (tmp_path / "out" / "notes.txt").write_text("mine")
     report = write_finetuned(done, tmp_path / "out", recipe=QUICK, drawings=None)
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["config.yaml", "curve.csv", "curve.png", "notes.txt", "report.md", "weights.safetensors"]
+    assert names == [
+        "config.yaml",
+        "curve.csv",
+        "curve.png",
+        "notes.txt",
+        "report.html",
+        "report.md",
+        "weights.safetensors",
+    ]
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
     again = charnerf.load(tmp_path / "out")
     assert again.note is not None and "one character" in again.note and model.note is None
@@ -52,7 +60,7 @@ def test_the_folder_loads_as_the_adapted_model(model, person_views, tmp_path):
     rows = list(csv.DictReader((tmp_path / "out" / "curve.csv").open()))
     assert [int(row["step"]) for row in rows] == [0, 5, 10]
     assert float(rows[0]["held_out"]) > done.best.held_out
-    text = report.read_text()
+    text = report.with_suffix(".md").read_text()
     for words in (
         "Kept: the error",
         "for this one character",
@@ -66,7 +74,7 @@ def test_what_was_not_kept_is_said_and_loads_too(model, person_views, tmp_path):
     recipe = replace(QUICK, learning_rate=0.0)
     done = finetune(model, model.encode_views(person_views), recipe)
     report = write_finetuned(done, tmp_path / "out", recipe=recipe, drawings=None)
-    assert "Not kept" in report.read_text()
+    assert "Not kept" in report.with_suffix(".md").read_text()
     again = charnerf.load(tmp_path / "out" / "weights.safetensors")
     assert again.note is not None and "not kept" in again.note
     for name, tensor in again.network.state_dict().items():
@@ -78,7 +86,7 @@ def test_the_command_writes_weights_that_reconstruct_can_use(model, person_views
     arguments = [*drawings, "-o", str(tmp_path / "fitted"), "--weights", str(model.source)]
     assert run(["finetune", *arguments, "--seconds", "2", "--device", "cpu"]) == 0
     told = capsys.readouterr().err
-    assert "floor line" in told and "Left out" in told and "report.md" in told
+    assert "floor line" in told and "Left out" in told and "report.html" in told
     assert charnerf.load(tmp_path / "fitted").note is not None
     assert run(["finetune", *arguments, "--seconds", "0"]) == 2
     assert run(["finetune", *arguments[:3], "-o", drawings[0], "--seconds", "2"]) != 0

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from charnerf.reporting.blocks import Heading, Table, Text
 from charnerf.reporting.comparison import comparison
-from charnerf.reporting.document import Heading, Table, Text
 from charnerf.reporting.families import families, shown_rows, sorted_rows
 from charnerf.reporting.rows import group_rows
 from charnerf.reporting.runs import Run

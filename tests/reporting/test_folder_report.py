@@ -92,7 +92,7 @@ def test_html_holds_plots_and_needs_nothing_else(grid):
     page = (grid / "report.html").read_text()
     assert "<title>charnerf: 2 rows, 3 runs in grid</title>" in page
     assert page.count('<figure class="plot">') == 3
-    assert "Plotly.newPlot" in page
+    assert "Plotly.react" in page
     assert not re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="(?!data:)', page)
     objects = pytest.importorskip("plotly.graph_objects")
     for text in re.findall(r'<script type="application/json">(.*?)</script>', page):

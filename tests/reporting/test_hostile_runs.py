@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from charnerf.cli.app import run
-from charnerf.reporting.document import Bullets, Code, Heading, Picture, Table, Text, to_markdown
+from charnerf.reporting.blocks import Bullets, Code, Heading, Picture, Table, Text
+from charnerf.reporting.document import to_markdown
 
 TABLE = b"method,character,view,psnr\n"
 BROKEN = {

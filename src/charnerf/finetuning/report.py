@@ -14,14 +14,15 @@ from charnerf.files import write_folder_aside
 from charnerf.finetuning.finetune import LEARNING, CurvePoint, Finetuned
 from charnerf.finetuning.recipe import Recipe
 from charnerf.inference.weights import save_config, save_weights
-from charnerf.markdown import table
+from charnerf.reporting.blocks import Block, Bullets, Heading, Picture, Table, Text
+from charnerf.reporting.document import write_report
 
 ROWS = 12  # of the curve shown in the report; curve.csv has all
 OURS, LIKENESS = "#1f5fa8", "#b8641f"
 
 
 def write_finetuned(done: Finetuned, output: Path, *, recipe: Recipe, drawings: Turnaround | None) -> Path:
-    """Write DIR/weights.safetensors, config.yaml, curve.csv, curve.png and report.md.
+    """Write DIR/weights.safetensors, config.yaml, curve.csv, curve.png, report.md and report.html.
 
     Args:
         done: What fine-tuning gave.
@@ -37,8 +38,8 @@ def write_finetuned(done: Finetuned, output: Path, *, recipe: Recipe, drawings: 
         save_config(aside, done.model.config)
         write_curve(done, aside / "curve.csv")
         plot_curve(done, aside / "curve.png")
-        (aside / "report.md").write_text(report_text(done, recipe, drawings), encoding="utf-8")
-    return output / "report.md"
+        write_report(aside, "Fine-tuned to one character", report_blocks(done, recipe, drawings, aside))
+    return output / "report.html"
 
 
 def note_of(done: Finetuned) -> str:
@@ -99,40 +100,41 @@ def summary_lines(done: Finetuned) -> list[str]:
     ]
 
 
-def curve_table(done: Finetuned) -> list[str]:
-    """Error against seconds as Markdown rows, thinned out."""
+def curve_table(done: Finetuned) -> Table:
+    """Error against seconds, thinned out."""
     heads = ("seconds", "step", "held-out error", "held-out PSNR, dB", "novel views to the start, dB")
     rows = []
     every = max(1, -(-len(done.curve) // ROWS))
     for index, point in enumerate(done.curve):
         if index % every and point is not done.best and index != len(done.curve) - 1:
             continue
-        mark = "**" if point.step == done.best.step else ""
+        mark = " (kept)" if point.step == done.best.step else ""
         likeness = f"{point.likeness:.1f}" if math.isfinite(point.likeness) else "equal"
-        cells = [f"{point.seconds:.1f}", f"{mark}{point.step}{mark}", f"{point.held_out:.5f}"]
+        cells = [f"{point.seconds:.1f}", f"{point.step}{mark}", f"{point.held_out:.5f}"]
         rows.append([*cells, f"{point.held_out_psnr:.2f}", likeness])
-    return table(heads, rows)
+    return Table(heads, rows)
 
 
-def report_text(done: Finetuned, recipe: Recipe, drawings: Turnaround | None) -> str:
-    """The Markdown text of report.md."""
-    lines = ["# Fine-tuned to one character", "", *(f"- {one}" for one in summary_lines(done)), ""]
-    lines += ["Load them by `charnerf.load(DIR)` or `--weights DIR`.", ""]
-    lines += ["## Error against seconds", "", "![PSNR against seconds](curve.png)", ""]
-    lines += [*curve_table(done), ""]
-    lines += [
+def report_blocks(done: Finetuned, recipe: Recipe, drawings: Turnaround | None, folder: Path) -> list[Block]:
+    """The report; its curve lies in the folder."""
+    learnt = (
         f"Learnt: {', '.join(LEARNING)} of the finest field. Held out: {100 * recipe.held_out:.0f} % of "
         f"{recipe.patches} x {recipe.patches} patches a drawing, of which nothing was learnt. Novel views: cameras around "
-        "the character, against the weights at the start; those of the guard are other ones than those learnt from.",
-        "",
-        "## Recipe",
-        "",
-        *table(("setting", "value"), [(name, str(value)) for name, value in asdict(recipe).items()]),
-        "",
+        "the character, against the weights at the start; those of the guard are other ones than those learnt from."
+    )
+    blocks: list[Block] = [
+        Heading("Fine-tuned to one character", 1),
+        Bullets(summary_lines(done)),
+        Text("Load them by `charnerf.load(DIR)` or `--weights DIR`."),
+        Heading("Error against seconds"),
+        Picture(folder / "curve.png", "PSNR against seconds"),
+        curve_table(done),
+        Text(learnt),
+        Heading("Recipe"),
+        Table(("setting", "value"), [(name, str(value)) for name, value in asdict(recipe).items()]),
     ]
     if drawings is not None:
-        lines += ["## What was assumed about the drawings", "", *(f"- {one}" for one in drawings.assumptions)]
-        lines += [*(f"- **warning**: {one}" for one in drawings.warnings), ""]
-    lines += ["## Seconds", ""]
-    lines += table(("stage", "seconds"), [(stage, f"{value:.1f}") for stage, value in done.seconds.items()])
-    return "\n".join([*lines, ""])
+        blocks += [Heading("What was assumed about the drawings"), Bullets(drawings.assumptions)]
+        blocks += [Bullets(drawings.warnings, warnings=True)] if drawings.warnings else []
+    stages = [(stage, f"{value:.1f}") for stage, value in done.seconds.items()]
+    return [*blocks, Heading("Seconds"), Table(("stage", "seconds"), stages)]

@@ -8,7 +8,7 @@ from charnerf.data.characters import Character
 from charnerf.errors import CharNeRFError
 from charnerf.evaluation.attention import ATTENTION_FILE, AttentionProfile, attention_profile
 from charnerf.inference.model import Model
-from charnerf.reporting.document import Block, Heading, Picture, Text
+from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.plots import Line, plot_lines
 from charnerf.reporting.rows import Row
 from charnerf.reporting.runs import Run, measured

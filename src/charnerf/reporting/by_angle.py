@@ -6,7 +6,7 @@ from pathlib import Path
 
 from charnerf.evaluation.angles import AZIMUTH_STEP_DEG, SOURCE_EDGES_DEG, azimuth_bin, edge_bin
 from charnerf.evaluation.character import OURS
-from charnerf.reporting.document import Block, Heading, Picture, Plot, Text
+from charnerf.reporting.blocks import Block, Heading, Picture, Plot, Text
 from charnerf.reporting.interactive import boxes_figure
 from charnerf.reporting.plots import plot_boxes
 from charnerf.reporting.rows import Row

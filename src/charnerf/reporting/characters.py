@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from statistics import fmean
 
-from charnerf.reporting.document import Block, Heading, Table, Text
+from charnerf.reporting.blocks import Block, Heading, Table, Text
 from charnerf.reporting.formats import COLUMNS, cell
 from charnerf.reporting.rows import Row
 

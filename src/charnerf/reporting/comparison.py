@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from charnerf.reporting.document import Block, Bullets, Heading, Table, Text
+from charnerf.reporting.blocks import Block, Bullets, Heading, Table, Text
 from charnerf.reporting.families import TABLE_TWO, Family, families
 from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, NONE, cell, seconds_text
 from charnerf.reporting.rows import Row

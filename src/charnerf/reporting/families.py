@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from charnerf.reporting.document import Block, Text
+from charnerf.reporting.blocks import Block, Text
 from charnerf.reporting.rows import Row
 
 TABLE_TWO = {

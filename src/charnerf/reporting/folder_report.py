@@ -5,12 +5,14 @@ from pathlib import Path
 
 from charnerf.errors import DataError
 from charnerf.reporting.attention import attention, with_view_attention
+from charnerf.reporting.blocks import Block, Heading, Text
 from charnerf.reporting.by_angle import by_angle
 from charnerf.reporting.characters import characters
 from charnerf.reporting.comparison import comparison, costs, unfinished
-from charnerf.reporting.document import Block, Heading, Text, write_report
+from charnerf.reporting.document import write_report
 from charnerf.reporting.families import best_row, families, left_out_rows, shown_rows, sorted_rows
 from charnerf.reporting.lods import lods
+from charnerf.reporting.meshes import row_meshes
 from charnerf.reporting.picture_matrix import picture_matrix
 from charnerf.reporting.ray_weights import sharpness
 from charnerf.reporting.real_drawings import real_drawings
@@ -89,6 +91,7 @@ def write_folder_report(
         blocks += [*picture_matrix(shown, folder, **names), *note]
         if drawings is not None:
             blocks += [*real_drawings(shown, drawings, folder, trusted=trusted, **names), *note]
+    blocks += row_meshes(rows)
     blocks += sharpness(rows, folder, trusted=trusted)
     blocks += attention(shown_rows(with_view_attention(rows), ATTENTION_ROWS), folder, trusted=trusted)
     blocks += lods(rows)

@@ -8,7 +8,7 @@ from typing import Any
 from charnerf.errors import DataError
 from charnerf.files import read_text
 from charnerf.meshing.lod import PAPER
-from charnerf.reporting.document import Block, Heading, Table
+from charnerf.reporting.blocks import Block, Heading, Table
 from charnerf.reporting.formats import NONE, cell, seconds_text
 from charnerf.reporting.rows import Row
 

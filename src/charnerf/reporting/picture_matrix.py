@@ -9,8 +9,8 @@ from PIL import Image
 from charnerf.data.characters import Character, load_character
 from charnerf.errors import DataError
 from charnerf.evaluation.angles import view_angles
+from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.characters import ranked
-from charnerf.reporting.document import Block, Heading, Picture, Text
 from charnerf.reporting.picture_sheet import open_on_white, picture_on_white, save_sheet
 from charnerf.reporting.rows import Row
 from charnerf.reporting.runs import Run, data_root

@@ -7,7 +7,7 @@ from charnerf.data.characters import Character
 from charnerf.errors import CharNeRFError
 from charnerf.evaluation.ray_weights import NUM_SAMPLES, RAY_WEIGHTS_FILE, STEP, RayWeights, ray_weights
 from charnerf.inference.model import Model
-from charnerf.reporting.document import Block, Bullets, Heading, Picture, Table, Text
+from charnerf.reporting.blocks import Block, Bullets, Heading, Picture, Table, Text
 from charnerf.reporting.formats import NONE
 from charnerf.reporting.plots import plot_lines
 from charnerf.reporting.rows import Row

@@ -21,7 +21,7 @@ from charnerf.geometry.framing import SOURCE_ORDER, source_cameras
 from charnerf.inference.model import Model
 from charnerf.inference.weights import load
 from charnerf.pictures import open_picture
-from charnerf.reporting.document import Block, Heading, Picture, Text
+from charnerf.reporting.blocks import Block, Heading, Picture, Text
 from charnerf.reporting.picture_sheet import CELL, picture_on_white, save_sheet
 from charnerf.reporting.rows import Row
 from charnerf.types import SourceViews

@@ -4,17 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from charnerf.reporting.document import (
-    Block,
-    Bullets,
-    Code,
-    Heading,
-    Picture,
-    Table,
-    Text,
-    write_report,
-)
+from charnerf.reporting.blocks import Block, Bullets, Code, Heading, Picture, Table, Text
+from charnerf.reporting.document import write_report
 from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, metric_cells, seconds_text
+from charnerf.reporting.meshes import run_meshes
 from charnerf.reporting.plots import plot_angles, plot_training
 from charnerf.reporting.run_files import read_curve, read_metrics
 
@@ -43,6 +36,7 @@ def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> P
     shown = _best_middle_worst(sheets)
     if shown:
         blocks += [Heading("Best, middle, worst"), *(sheets[name] for name in shown)]
+    blocks += run_meshes(folder)
     blocks += [*_curve(folder), *_angles(folder, metrics), *_characters(worst_first, metrics)]
     rest = [sheets[name] for name in sheets if name not in shown][: MAX_SHEETS - len(shown)]
     if rest:

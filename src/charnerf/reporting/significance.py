@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from charnerf.reporting.blocks import Block, Bullets, Heading, Table, Text
 from charnerf.reporting.bootstrap import LEVEL, RESAMPLES, Difference, compare_rows
 from charnerf.reporting.characters import scores_by_character
-from charnerf.reporting.document import Block, Bullets, Heading, Table, Text
 from charnerf.reporting.families import families
 from charnerf.reporting.formats import NONE
 from charnerf.reporting.rows import Row

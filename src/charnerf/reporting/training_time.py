@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 
-from charnerf.reporting.document import Block, Heading, Picture, Plot, Table, Text
+from charnerf.reporting.blocks import Block, Heading, Picture, Plot, Table, Text
 from charnerf.reporting.formats import seconds_text
 from charnerf.reporting.interactive import lines_figure
 from charnerf.reporting.plots import Line, plot_lines

@@ -1,0 +1,195 @@
+"""A report as one HTML file that needs nothing else: pictures and meshes stand inside, and what draws them."""
+
+import base64
+import html
+import io
+import json
+from collections.abc import Iterator, Sequence
+from functools import singledispatch
+from importlib.resources import files
+from pathlib import Path
+
+from charnerf.pictures import open_picture
+from charnerf.reporting.blocks import (
+    Block,
+    Bullets,
+    Code,
+    Files,
+    Film,
+    Heading,
+    Mesh,
+    Picture,
+    Plot,
+    SideBySide,
+    Table,
+    Text,
+    link,
+)
+from charnerf.viewer.element import mesh_element, viewer_script
+
+MOST_MESH = 16 * 2**20  # bytes of a mesh that stands in a page itself
+
+
+@singledispatch
+def _html(block: Block) -> str:
+    """One block as HTML."""
+    raise TypeError(type(block).__name__)
+
+
+@_html.register
+def _(block: Heading) -> str:
+    return f"<h{block.level}>{html.escape(block.text)}</h{block.level}>"
+
+
+@_html.register
+def _(block: Text) -> str:
+    kind = ' class="lead"' if block.lead else ""
+    return f"<p{kind}>{html.escape(block.text)}</p>"
+
+
+@_html.register
+def _(block: Bullets) -> str:
+    kind = ' class="warning"' if block.warnings else ""
+    return "<ul>" + "".join(f"<li{kind}>{html.escape(item)}</li>" for item in block.items) + "</ul>"
+
+
+@_html.register
+def _(block: Code) -> str:
+    inner = f"<pre>{html.escape(block.text.rstrip())}</pre>"
+    return (
+        f"<details><summary>{html.escape(block.folded)}</summary>{inner}</details>" if block.folded else inner
+    )
+
+
+@_html.register
+def _(block: Table) -> str:
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    rows = "".join(line(row, "td") for row in block.rows)
+    kind = ' class="emphasis"' if block.emphasis else ""
+    inner = f"<table{kind}><thead>{line(block.header, 'th')}</thead><tbody>{rows}</tbody></table>"
+    # wide tables scroll inside, from the keyboard too
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="table: {_columns(block)}">{inner}</div>'
+    )
+
+
+@_html.register
+def _(block: Picture) -> str:
+    caption = html.escape(block.caption)
+    return _figure(f'<img alt="{caption}" src="{_embedded(block.path)}">', caption)
+
+
+@_html.register
+def _(block: Film) -> str:
+    caption = html.escape(block.caption)
+    source = _data_address(
+        block.path.read_bytes(), f"{'video/mp4' if block.path.suffix == '.mp4' else 'image/gif'}"
+    )
+    if block.path.suffix != ".mp4":
+        return _figure(f'<img alt="{caption}" src="{source}">', caption)
+    return _figure(
+        f'<video controls loop muted playsinline aria-label="{caption}" src="{source}"></video>', caption
+    )
+
+
+@_html.register
+def _(block: Mesh) -> str:
+    caption = html.escape(block.caption)
+    size = block.path.stat().st_size
+    if size > MOST_MESH:
+        return f"<p>{caption}: {size / 2**20:.0f} MiB, too large to stand in this page; it opens in Blender and in viewers.</p>"
+    return _figure(mesh_element(block.caption, source=block.path.read_bytes()), caption)
+
+
+@_html.register
+def _(block: SideBySide) -> str:
+    kind = "row meshes" if any(isinstance(item, Mesh) for item in block.items) else "row"
+    return f'<div class="{kind}">{"".join(_html(item) for item in block.items)}</div>'
+
+
+@_html.register
+def _(block: Files) -> str:
+    return (
+        "<ul>"
+        + "".join(
+            f'<li><a href="{link(name)}">{html.escape(name)}</a>: {html.escape(what)}</li>'
+            for name, what in block.entries
+        )
+        + "</ul>"
+    )
+
+
+@_html.register
+def _(block: Plot) -> str:
+    figure = json.dumps(block.figure, allow_nan=False).replace("<", "\\u003c")  # no text can end the script
+    return (
+        f'<figure class="plot"><div></div><script type="application/json">{figure}</script>'
+        f"<figcaption>{html.escape(block.picture.caption)}</figcaption></figure>"
+    )
+
+
+def _figure(content: str, caption: str) -> str:
+    return f"<figure>{content}<figcaption>{caption}</figcaption></figure>"
+
+
+def _columns(block: Table) -> str:
+    """What a table is about, for those who listen: its columns."""
+    return html.escape(", ".join(title for title in block.header if title))
+
+
+def plot_library() -> str | None:
+    """The script of plotly, to be embedded; None where the package is not installed."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError:
+        return None
+    return str(get_plotlyjs())
+
+
+def _embedded(path: Path) -> str:
+    """A picture as a data URL: small files as they are, large ones as JPEG of high quality."""
+    content, kind = path.read_bytes(), "png"
+    if len(content) > 200_000:
+        buffer = io.BytesIO()
+        with open_picture(path) as picture:
+            picture.convert("RGB").save(buffer, format="JPEG", quality=90, subsampling=0)
+        if buffer.tell() < len(content):
+            content, kind = buffer.getvalue(), "jpeg"
+    return _data_address(content, f"image/{kind}")
+
+
+def _data_address(content: bytes, kind: str) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def to_html(title: str, blocks: Sequence[Block]) -> str:
+    """A report as one HTML file that needs nothing else; plots are still pictures where plotly is not installed."""
+    library = plot_library() if any(isinstance(block, Plot) for block in blocks) else None
+    if library is None:
+        blocks = [block.picture if isinstance(block, Plot) else block for block in blocks]
+    body = "\n".join(_html(block) for block in blocks)
+    scripts = [] if library is None else [f"<script>{library}</script>\n"]
+    if any(isinstance(block, Mesh) for block in _each(blocks)):  # inert until page.js begins it
+        scripts.append(f'<script type="text/plain" id="mesh-viewer">{viewer_script()}</script>\n')
+    if scripts:
+        scripts.append(f"<script>{_page_file('page.js')}</script>\n")
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{html.escape(title)}</title>\n<style>{_page_file('page.css')}</style>\n</head>\n"
+        f"<body>\n<main>\n{body}\n</main>\n{''.join(scripts)}</body>\n</html>\n"
+    )
+
+
+def _each(blocks: Sequence[Block]) -> Iterator[Block]:
+    """All blocks, those in rows too."""
+    for block in blocks:
+        yield block
+        if isinstance(block, SideBySide):
+            yield from block.items
+
+
+def _page_file(name: str) -> str:
+    return files("charnerf.reporting").joinpath(name).read_text(encoding="utf-8")
