@@ -1,5 +1,6 @@
 """A reconstruction's folder: whole, complete, measured; a fake network answers in place of a trained one."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -83,6 +84,8 @@ def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
         "drawings.png",
         "mesh.glb",
         "meshes",
+        "report.html",
+        "report.json",
         "report.md",
         "sheet.png",
         done.turntable.name,
@@ -118,7 +121,7 @@ def test_the_mesh_wears_the_drawings(tmp_path, drawings):
 
 def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
     done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
-    text = done.report.read_text()
+    text = done.report.with_suffix(".md").read_text()
     for words in (
         "floor line",
         "left side",
@@ -128,6 +131,13 @@ def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
         "weights.safet",
     ):
         assert words in text
+    facts = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert (
+        facts["quality"] == json.loads(json.dumps(done.quality.facts()))
+        and facts["seconds"].keys() == done.seconds.keys()
+    )
+    assert min(one.given for one in done.quality.silhouettes) > 0.93  # the field is the drawn egg
+    assert (done.quality.parts, done.quality.is_closed, done.quality.handles) == (1, True, 0)
     for line in text.splitlines():  # every file shown is there
         for part in line.split("](")[1:]:
             assert (done.report.parent / part.split(")")[0]).exists()

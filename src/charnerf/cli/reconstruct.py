@@ -48,7 +48,7 @@ def command(
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
-    """Turn drawings, or a sheet, into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.md.
+    """Turn drawings, or a sheet, into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.html.
 
     The images have alpha or a plain background, any sizes and crops: figures are cut out and brought to one
     height and floor line, and where views disagree the later ones are moved to the earlier ones. What was assumed

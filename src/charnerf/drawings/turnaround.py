@@ -37,6 +37,7 @@ class Turnaround:
         names: What each view is: "front", "left", "back", "45 degrees".
         detailed: The same views with as many pixels as the finest drawing has, within DETAIL; for textures.
         half_extent: Half the canvas' side, m.
+        given_alphas: The views' masks before they were reconciled, (V, S, S).
         reconciliation: How the views agree, and what was moved.
         assumptions: What was done and assumed, plain sentences.
         warnings: What looks wrong, plain sentences.
@@ -47,6 +48,7 @@ class Turnaround:
     detailed: SourceViews
     names: tuple[str, ...]
     half_extent: float
+    given_alphas: np.ndarray
     reconciliation: Reconciliation
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -101,6 +103,7 @@ def read_views(
         detailed=_source_views(detailed, figures, extent),
         names=names,
         half_extent=extent,
+        given_alphas=np.stack([canvas[..., 3] for canvas in given]),
         reconciliation=agreement,
         assumptions=(
             *_assumptions(figures, extent, size),

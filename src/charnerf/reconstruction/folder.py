@@ -1,10 +1,12 @@
-"""Drawings to a folder: mesh.glb, turntable.mp4, views and report.md."""
+"""Drawings to a folder: mesh.glb, turntable.mp4, views and report.html."""
 
+import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -26,8 +28,10 @@ from charnerf.pictures import bytes_on_white
 from charnerf.reconstruction.model_sheet import model_sheet
 from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.reconstruction.progress import BAR, meter
-from charnerf.reconstruction.report import mesh_sentences, mesh_words, report_text
+from charnerf.reconstruction.quality import Quality, measure, suggestions
+from charnerf.reconstruction.report import Made, mesh_sentences, mesh_words, report_blocks, report_facts
 from charnerf.reconstruction.turntable import render_around, write_film
+from charnerf.reporting.document import write_report
 
 MOST_VIEWS = 12
 MESH_STEPS = 12  # of the progress bar, beside one a frame: what a mesh takes, about
@@ -41,8 +45,11 @@ class Reconstruction:
         mesh: mesh.glb.
         turntable: turntable.mp4 or turntable.gif.
         views: PNG files with alpha, by azimuth.
-        report: report.md.
+        report: report.html; report.md and report.json lie beside it.
         built: The mesh and how it came about.
+        quality: What it is worth.
+        suggestions: What may make it better.
+        facts: The content of report.json.
         warnings: Sentences.
         seconds: By stage.
     """
@@ -52,6 +59,9 @@ class Reconstruction:
     views: tuple[Path, ...]
     report: Path
     built: BuiltMesh
+    quality: Quality
+    suggestions: tuple[str, ...]
+    facts: dict[str, Any]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
 
@@ -93,17 +103,25 @@ def reconstruct(
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
         say(line)
     with write_folder_aside(output) as folder:
-        film, views = _write(folder, pictures, built, drawings, sheet, refined, seconds, model.source.name)
-    for other in {"turntable.mp4", "turntable.gif"} - {film}:  # of a reconstruction before
+        made = _write(folder, pictures, built, drawings, sheet, refined, seconds, model.source.name, options)
+    for other in {"turntable.mp4", "turntable.gif"} - {made.film.name}:  # of a reconstruction before
         (output / other).unlink(missing_ok=True)
+    return _moved(made, output)
+
+
+def _moved(made: Made, output: Path) -> Reconstruction:
+    """What was made, its files where they lie in the end."""
     return Reconstruction(
         mesh=output / "mesh.glb",
-        turntable=output / film,
-        views=tuple(output / "views" / view for view in views),
-        report=output / "report.md",
-        built=built,
-        warnings=drawings.warnings,
-        seconds=seconds,
+        turntable=output / made.film.name,
+        views=tuple(output / "views" / view.name for view in made.views),
+        report=output / "report.html",
+        built=made.built,
+        quality=made.quality,
+        suggestions=tuple(made.suggestions),
+        facts=report_facts(made),
+        warnings=made.drawings.warnings,
+        seconds=made.seconds,
     )
 
 
@@ -170,8 +188,9 @@ def _write(
     refined: Finetuned | None,
     seconds: dict[str, float],
     weights: str,
-) -> tuple[str, list[str]]:
-    """Write mesh, turntable, views and report; names of the turntable and of the views."""
+    options: ReconstructionOptions,
+) -> Made:
+    """Write mesh, turntable, views and report."""
     save_mesh(built.mesh, folder / "mesh.glb")
     (folder / "meshes").mkdir()
     contact_sheet(built.mesh, drawings.detailed).save(folder / "meshes" / "mesh_sheet.png")
@@ -183,19 +202,24 @@ def _write(
         Image.fromarray(sheet).save(folder / "sheet_as_read.png")
     if refined is not None:
         plot_curve(refined, folder / "refinement.png")
-    text = report_text(
+    quality = measure(built, drawings, pictures, height=options.mesh.height)
+    made = Made(
+        folder=folder,
         drawings=drawings,
         built=built,
+        quality=quality,
+        suggestions=suggestions(quality, options, num_drawings=len(drawings.names)),
         film=film,
         film_note=film_note,
-        views=views[:: max(1, len(views) // 4)],
+        views=views,
         seconds=seconds,
         weights=weights,
         refined=refined,
         from_sheet=sheet is not None,
     )
-    (folder / "report.md").write_text(text, encoding="utf-8")
-    return film.name, [view.name for view in views]
+    write_report(folder, "Reconstructed character", report_blocks(made))
+    (folder / "report.json").write_text(json.dumps(report_facts(made), indent=2) + "\n", encoding="utf-8")
+    return made
 
 
 def _write_views(pictures: list[np.ndarray], folder: Path) -> list[Path]:

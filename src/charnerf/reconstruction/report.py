@@ -1,69 +1,162 @@
-"""The report of a reconstruction: what was assumed, what was made, how long it took."""
+"""The report of a reconstruction: what was assumed, what was made, how good it is, how long it took."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import curve_table, summary_lines
 from charnerf.markdown import table
 from charnerf.meshing.build import BuiltMesh
+from charnerf.reconstruction.quality import Quality, quality_words
+from charnerf.reporting.blocks import (
+    Block,
+    Bullets,
+    Files,
+    Film,
+    Heading,
+    Mesh,
+    Picture,
+    SideBySide,
+    Table,
+    Text,
+)
+from charnerf.wording import counted
 
+SHOWN_VIEWS = 4
 ROWS_OF_LEVELS = 8
+LEVEL_HEADS = ("density", "distance, mm", "IoU")
 
 
-def report_text(
-    *,
-    drawings: Turnaround,
-    built: BuiltMesh,
-    film: Path,
-    film_note: str | None,
-    views: Sequence[Path],
-    seconds: dict[str, float],
-    weights: str,
-    refined: Finetuned | None = None,
-    from_sheet: bool = False,
-) -> str:
-    """The Markdown text of report.md; the files that it shows lie beside it.
+@dataclass(frozen=True)
+class Made:
+    """What was made and how, as the report tells it.
 
-    Args:
+    Attributes:
+        folder: Where the files lie.
         drawings: What was assumed.
-        built: The mesh.
+        built: The mesh, mesh.glb.
+        quality: What it is worth.
+        suggestions: What may make it better.
         film: The turntable's file.
         film_note: What is to be said about it, or None.
-        views: Pictures, shown in the report's order.
+        views: Picture files by azimuth.
         seconds: By stage.
         weights: Where the model came from.
         refined: How the weights were adapted to the drawings, if they were.
         from_sheet: Whether they were found on a sheet, whose picture lies beside.
     """
-    lines = ["# Reconstructed character", "", " ".join(_picture(view) for view in views[:4]), ""]
-    lines += ["## What was assumed about the drawings", ""]
-    if from_sheet:
-        lines += ["![the sheet, its figures and what was left aside](sheet_as_read.png)", ""]
-    lines += ["![the drawings, cut out and aligned](drawings.png)", ""]
-    lines += [f"- {one}" for one in drawings.assumptions]
-    lines += [f"- **warning**: {one}" for one in drawings.warnings]
-    lines += ["", "## Files", ""]
-    lines += [f"- [mesh.glb](mesh.glb): {mesh_words(built)}; metres, Y up, facing +Z"]
-    lines += [f"- [{film.name}]({film.name}){': ' + film_note if film_note else ''}"]
-    lines += [
-        "- [meshes/mesh_sheet.png](meshes/mesh_sheet.png): the mesh from all sides, beside the drawings"
+
+    folder: Path
+    drawings: Turnaround
+    built: BuiltMesh
+    quality: Quality
+    suggestions: Sequence[str]
+    film: Path
+    film_note: str | None
+    views: Sequence[Path]
+    seconds: dict[str, float]
+    weights: str
+    refined: Finetuned | None = None
+    from_sheet: bool = False
+
+
+def report_blocks(made: Made) -> list[Block]:
+    """The report, the result first; the files that it shows lie beside it."""
+    shown = made.views[:: max(1, len(made.views) // SHOWN_VIEWS)][:SHOWN_VIEWS]
+    blocks: list[Block] = [
+        Heading("Reconstructed character", 1),
+        Text(quality_words(made.quality), lead=True),
     ]
-    lines += ["- [sheet.png](sheet.png): a model sheet of the result, the drawings above"]
-    lines += ["- [views](views): pictures with alpha, named by azimuth in degrees", ""]
-    lines += _mesh_lines(built)
-    if refined is not None:
-        lines += ["", "## Refinement", "", *(f"- {one}" for one in summary_lines(refined)), ""]
-        lines += ["![error against seconds](refinement.png)", "", *curve_table(refined)]
-    lines += ["", "## Seconds", ""]
-    lines += table(("stage", "seconds"), [(stage, f"{value:.1f}") for stage, value in seconds.items()])
-    lines += ["", f"Weights: {weights}", ""]
-    return "\n".join(lines)
+    blocks += [Bullets(made.suggestions)] if made.suggestions else []
+    blocks += [Mesh(made.folder / "mesh.glb", f"The mesh, to be turned: {mesh_words(made.built)}")]
+    blocks += [SideBySide([*(Picture(view, f"{int(view.stem)}°, rendered") for view in shown)])]
+    blocks += [Film(made.film, f"Turntable{f': {made.film_note}' if made.film_note else ''}")]
+    blocks += [
+        Picture(made.folder / "sheet.png", "The drawings as the model took them, and the result all around")
+    ]
+    blocks += [
+        Picture(
+            made.folder / "meshes" / "mesh_sheet.png", "Drawings, and the mesh in its colours and as clay"
+        )
+    ]
+    blocks += [*_drawings(made), *_quality(made.quality), *_files(made), *_mesh(made.built)]
+    if made.refined is not None:
+        blocks += [Heading("Refinement"), Bullets(summary_lines(made.refined))]
+        blocks += [
+            Picture(made.folder / "refinement.png", "Error against seconds"),
+            curve_table(made.refined),
+        ]
+    stages = [(stage, f"{value:.1f}") for stage, value in made.seconds.items()]
+    return [
+        *blocks,
+        Heading("Seconds"),
+        Table(("stage", "seconds"), stages),
+        Text(f"Weights: {made.weights}"),
+    ]
 
 
-def _picture(view: Path) -> str:
-    return f"![{view.stem} degrees]({view.parent.name}/{view.name})"
+def report_facts(made: Made) -> dict[str, Any]:
+    """The figures of the report, for programs."""
+    surface = made.built.surface
+    return {
+        "quality": made.quality.facts(),
+        "suggestions": list(made.suggestions),
+        "mesh": {
+            "vertices": len(surface.vertices),
+            "faces": len(surface.faces),
+            "extents_m": [float(one) for one in surface.extents],
+            "texture": None if made.built.textured is None else made.built.textured.size,
+            "level": float(made.built.level),
+        },
+        "assumptions": list(made.drawings.assumptions),
+        "warnings": list(made.drawings.warnings),
+        "seconds": made.seconds,
+        "weights": made.weights,
+        "refined": None if made.refined is None else made.refined.kept,
+    }
+
+
+def _drawings(made: Made) -> list[Block]:
+    """What was assumed, drawn and said."""
+    blocks: list[Block] = [Heading("What was assumed about the drawings")]
+    if made.drawings.warnings:
+        blocks.append(Bullets(made.drawings.warnings, warnings=True))
+    if made.from_sheet:
+        blocks.append(
+            Picture(made.folder / "sheet_as_read.png", "The sheet, its figures and what was left aside")
+        )
+    caption = "The drawings, cut out and aligned, and below, where any was moved, reconciled"
+    return [*blocks, Picture(made.folder / "drawings.png", caption), Bullets(made.drawings.assumptions)]
+
+
+def _quality(quality: Quality) -> list[Block]:
+    """Outlines against every drawing, haze and what kind of surface it is."""
+    rows = [(one.view, f"{one.given:.3f}", f"{one.reconciled:.3f}") for one in quality.silhouettes]
+    return [
+        Heading("How good it is"),
+        Table(("drawing", "IoU with it as given", "IoU with it as reconciled"), rows),
+        Text(
+            "IoU: of the mesh's outline with the drawing's, 1 where they are one. What no drawing shows can not be checked here."
+            " Haze: share of the pictures' figure that is neither clear nor opaque. A surface that is closed may still be frayed:"
+            " holes through it and loose parts tell."
+        ),
+    ]
+
+
+def _files(made: Made) -> list[Block]:
+    """What lies beside the report."""
+    entries = [
+        ("mesh.glb", f"{mesh_words(made.built)}; metres, Y up, facing +Z"),
+        (made.film.name, made.film_note or "the turntable"),
+        ("meshes/mesh_sheet.png", "the mesh from all sides, beside the drawings"),
+        ("sheet.png", "a model sheet of the result, the drawings above"),
+        ("views", "pictures with alpha, named by azimuth in degrees"),
+        ("report.json", "the figures of this report"),
+    ]
+    return [Heading("Files"), Files(entries)]
 
 
 def mesh_words(built: BuiltMesh) -> str:
@@ -81,12 +174,13 @@ def mesh_words(built: BuiltMesh) -> str:
 def mesh_sentences(built: BuiltMesh) -> list[str]:
     """How a mesh came about."""
     share = built.left_out.shares()["grid_cells"] or 0.0
+    dropped = f"{counted(built.num_floaters, 'loose part')} and {counted(built.num_cavities, 'hidden cavity', 'hidden cavities')}"
     lines = [
         f"Surface where the density is {built.level:.3g} per metre; Euler number "
         f"{built.surface.euler_number}.",
         f"{100 * built.missed:.1f} % of the figure's pixels in the drawings met no surface; densities were raised there.",
         f"{100 * share:.1f} % of the grid's points were left out: outside the hull or away from the surface.",
-        f"{built.num_floaters} loose parts and {built.num_cavities} hidden cavities were dropped.",
+        f"{dropped} were dropped.",
         f"{built.num_extracted} faces before decimation.",
     ]
     if built.textured is not None:
@@ -98,24 +192,35 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
     return lines
 
 
-def _mesh_lines(built: BuiltMesh) -> list[str]:
+def _mesh(built: BuiltMesh) -> list[Block]:
     """How the mesh came about, and the evidence for its level."""
-    lines = ["## Mesh", "", *(f"- {one}" for one in mesh_sentences(built))]
-    return [*lines, "", *level_lines(built)]
+    blocks: list[Block] = [Heading("Mesh"), Bullets(mesh_sentences(built)), Text(_level_words(built))]
+    return blocks if built.choice is None else [*blocks, Table(LEVEL_HEADS, _level_rows(built))]
 
 
 def level_lines(built: BuiltMesh) -> list[str]:
-    """The density that the surface was drawn at, beside others: distance from rendered depths, silhouettes."""
+    """The density that the surface was drawn at, beside others, as Markdown."""
     if built.choice is None:
-        return [f"The density {built.level:.3g} per metre was given, not chosen."]
-    lines = ["The density was chosen so that the surface lies where rendering, seen from around, loses"]
-    lines += ["half of its light. IoU: of the surface's silhouettes with the drawings.", ""]
-    rows = []
-    tried = built.choice.tried
+        return [_level_words(built)]
+    return [_level_words(built), "", *table(LEVEL_HEADS, _level_rows(built))]
+
+
+def _level_words(built: BuiltMesh) -> str:
+    if built.choice is None:
+        return f"The density {built.level:.3g} per metre was given, not chosen."
+    return (
+        "The density was chosen so that the surface lies where rendering, seen from around, loses half of its light. IoU: of"
+        " the surface's silhouettes with the drawings."
+    )
+
+
+def _level_rows(built: BuiltMesh) -> list[tuple[str, str, str]]:
+    """Density, distance from rendered depths, silhouettes; the chosen one is marked."""
+    assert built.choice is not None  # asked for by those that have one
+    tried, rows = built.choice.tried, []
     step = max(1, len(tried) // ROWS_OF_LEVELS)
     for index, one in enumerate(tried):
         if index % step == 0 or one.level == built.level:
-            mark = "**" if one.level == built.level else ""
-            cells = (f"{mark}{one.level:.3g}{mark}", f"{1000 * one.depth_error:.1f}", f"{one.mask_iou:.3f}")
-            rows.append(cells)
-    return [*lines, *table(("density", "distance, mm", "IoU"), rows)]
+            mark = " (chosen)" if one.level == built.level else ""
+            rows.append((f"{one.level:.3g}{mark}", f"{1000 * one.depth_error:.1f}", f"{one.mask_iou:.3f}"))
+    return rows
