@@ -16,7 +16,7 @@ MAX_FUNCTION_LINES = 50
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
     ("errors", "interruption"),
-    ("types", "checks", "schedule", "files", "markdown", "wording"),
+    ("types", "checks", "schedule", "files", "markdown", "progress", "wording"),
     ("pictures", "viewer"),
     ("process",),
     ("geometry",),

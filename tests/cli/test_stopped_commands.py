@@ -46,7 +46,7 @@ def files_of(folder: Path) -> list[Path]:
 def test_evaluate(tmp_path, number, status):
     generate_dataset(tmp_path / "set", 0, 0, 2, 0, views=40, size=128, processes=1)
     command = ["evaluate", "--data", str(tmp_path / "set"), "--views", "all", "-o", str(tmp_path / "out")]
-    code, err = stop(command, once="| 1/80", number=number)
+    code, err = stop(command, once="evaluate test, 0 %", number=number)
     assert code == status, err
     assert f"stopped by {signal.Signals(number).name}." in err and "Traceback" not in err
     assert not (tmp_path / "out/metrics.json").exists()

@@ -3,9 +3,11 @@
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
 import torch
 from torch.utils.tensorboard import SummaryWriter
 
+from charnerf.progress import reported_to
 from charnerf.training.monitor import BudgetBar, _nearness
 from charnerf.types import RenderOutput
 from support import small_runs
@@ -21,13 +23,19 @@ def test_depth_is_drawn_of_what_is_seen():
 
 
 def test_the_time_left_of_a_resumed_run_is_not_negative():
-    clock = SimpleNamespace(budget_seconds=100.0, budget_steps=None, seconds=40.6, steps=7)
-    bar = BudgetBar(clock=cast(Any, clock))
-    bar.on_train_start(cast(Any, None), cast(Any, None))
-    clock.seconds = 40.7
-    bar.on_train_batch_end(SimpleNamespace(callback_metrics={}), cast(Any, None))
-    assert bar.bar.n == clock.seconds > bar.bar.initial
-    bar.on_train_end(cast(Any, None), cast(Any, None))
+    clock = SimpleNamespace(budget_seconds=100.0, budget_steps=None, seconds=40.6, steps=10)
+    bar, moments = BudgetBar(clock=cast(Any, clock)), []
+    trainer = cast(Any, SimpleNamespace(callback_metrics={}, is_global_zero=True))
+    with reported_to(moments.append):
+        bar.on_train_start(trainer, cast(Any, None))
+        clock.seconds = 70.3
+        bar.on_train_batch_end(trainer, cast(Any, None))
+        clock.seconds = 101.0
+        bar.on_train_batch_end(trainer, cast(Any, None))
+        bar.teardown(trainer, cast(Any, None), "fit")
+    assert [one.share for one in moments] == pytest.approx([0.406, 0.703, 1.0])
+    assert moments[0].left_s == pytest.approx(59.4) and moments[-1].left_s == 0.0
+    assert moments[1].note == "step 10, loss -"
 
 
 def test_the_picture_that_is_shown_is_the_one_that_was_measured(figure_dataset, tmp_path, monkeypatch):

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from tqdm import tqdm
 
 from charnerf.capture import unfinished
 from charnerf.capture.character import CaptureOptions, capture_character
@@ -23,6 +22,7 @@ from charnerf.data.characters import CharacterPictures, remove_partial_character
 from charnerf.data.layout import add_to_split, check_name
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.interruption import held
+from charnerf.progress import Progress
 from charnerf.surfaces.mesh_files import write_surface_mesh
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import SurfaceMesh
@@ -221,16 +221,17 @@ def _capture_items(
     items = [item for item in items if item.name not in skipped]
     messages: dict[_Item, str | None] = {}
     try:
-        with tqdm(total=len(items), desc="capture", unit="character", dynamic_ncols=True) as bar:
+        with Progress("capture") as progress:
+            step = progress.counter(len(items))
             with closing(in_processes(work, items, processes)) as results:
                 for item, message in results:
                     if message is not None:
-                        bar.write(f"not captured: {message}")
+                        progress.say(f"not captured: {message}")
                     with held():
                         if message is None:
                             add([item.name])
                         messages[item] = message
-                    bar.update()
+                    step()
     finally:  # interrupted: what was written meanwhile belongs to the data set too
         unlisted = [item.name for item in items if item not in messages and (root / item.name).is_dir()]
         if unlisted:

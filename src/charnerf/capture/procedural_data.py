@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from tqdm import tqdm
 
 from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_scene_to, made_by
@@ -27,6 +26,7 @@ from charnerf.data.layout import (
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import locked
 from charnerf.procedural import GENERATOR_VERSION, make_character
+from charnerf.progress import Progress
 
 SPLITS = ("train", "val", "test")
 MOST_CHARACTERS = 3_000_000  # of a data set
@@ -220,17 +220,13 @@ def _make_missing(
 ) -> None:
     """Make the characters whose folders are not there, in parallel, and add them to their splits."""
     missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
-    with tqdm(
-        total=len(wanted),
-        initial=len(wanted) - len(missing),
-        desc="embedded characters",
-        unit="character",
-        dynamic_ncols=True,
-        disable=not missing,
-    ) as bar:
+    if not missing:
+        return
+    with Progress("embedded characters") as progress:
+        step = progress.counter(len(missing))
         for (split, index), _ in in_processes(make, missing, processes):
             add_to_split(root, split, [_name(split, index)])
-            bar.update()
+            step()
 
 
 def _make(pair: tuple[str, int], *, root: Path, seed: int, options: CaptureOptions) -> None:

@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from tqdm import tqdm
-
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.evaluation.character import MakeMesh, measure_character
@@ -17,6 +15,7 @@ from charnerf.evaluation.metrics_file import VIEWS_FILE, split_metrics, write_vi
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.evaluation.pictures import save_pictures
 from charnerf.models.charnerf import CharNeRF
+from charnerf.progress import Progress
 from charnerf.volume.renderers.base import AbstractRenderer
 
 
@@ -63,12 +62,12 @@ def evaluate(
     measure = partial(measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training)
     names = names_of(read_dataset(root), split)
     results = []
-    with tqdm(total=0, desc=f"evaluate {split}", unit="view") as bar:
+    with Progress(f"evaluate {split}") as progress:
         for place, name in enumerate(names):
             character = redrawn(load_character(root, name))
             frames = fixed_views(character, views)
-            bar.total = bar.n + len(frames) * (len(names) - place)  # the others are taken to have as many
-            result = measure(character, frames, lpips=lpips, on_picture=bar.update)
+            on_picture = progress.counter(len(frames), of=(place, len(names)))
+            result = measure(character, frames, lpips=lpips, on_picture=on_picture)
             if output is not None:
                 save_pictures(output / "images" / name, character, frames, result.pictures)
             results.append(replace(result, pictures={}))  # of one character at a time: they take memory

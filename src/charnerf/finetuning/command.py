@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from tqdm import tqdm
-
 from charnerf.drawings.turnaround import Picture
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.files import check_folder
@@ -14,22 +12,16 @@ from charnerf.finetuning.recipe import Recipe
 from charnerf.finetuning.report import summary_lines, write_finetuned
 from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
+from charnerf.progress import Progress
 
-BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
 
+def refine(model: Model, hero: Hero, seconds: float, *, progress: Progress) -> Finetuned:
+    """Fine-tune in a stage that shows how the held-out patches fare."""
 
-def refine(model: Model, hero: Hero, seconds: float, *, recipe: Recipe | None = None) -> Finetuned:
-    """Fine-tune with a progress bar that shows how the held-out patches fare."""
-    chosen = replace(recipe or Recipe(), seconds=seconds)
-    with tqdm(total=1.0, desc="fine-tune", bar_format=BAR) as bar:
+    def on_progress(share: float, point: CurvePoint) -> None:
+        progress.update(share, note=f"held out {point.held_out_psnr:.1f} dB")
 
-        def progress(share: float, point: CurvePoint) -> None:
-            bar.set_postfix_str(f", held out {point.held_out_psnr:.1f} dB", refresh=False)
-            bar.update(max(0.0, min(share, 0.99) - bar.n))
-
-        done = finetune(model, hero, chosen, on_progress=progress)
-        bar.update(1.0 - bar.n)
-    return done
+    return finetune(model, hero, replace(Recipe(), seconds=seconds), on_progress=on_progress)
 
 
 def finetune_drawings(
@@ -58,7 +50,8 @@ def finetune_drawings(
     assert drawings is not None  # encode made it
     for line in (*drawings.assumptions, *(f"warning: {one}" for one in drawings.warnings)):
         say(line)
-    done = refine(model, hero, seconds)
+    with Progress("fine-tune", {"fine-tune": seconds}, in_seconds=True) as progress:
+        done = refine(model, hero, seconds, progress=progress)
     report = write_finetuned(done, output, recipe=replace(Recipe(), seconds=seconds), drawings=drawings)
     for line in summary_lines(done):
         say(line)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from tqdm import tqdm
 
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.turnaround import Picture, Turnaround
@@ -25,16 +24,16 @@ from charnerf.meshing.build import BuiltMesh
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.pictures import bytes_on_white
+from charnerf.progress import Progress
 from charnerf.reconstruction.model_sheet import model_sheet
 from charnerf.reconstruction.options import ReconstructionOptions
-from charnerf.reconstruction.progress import BAR, meter
+from charnerf.reconstruction.progress import meter, reconstruction_stages
 from charnerf.reconstruction.quality import Quality, measure, suggestions
 from charnerf.reconstruction.report import Made, mesh_sentences, mesh_words, report_blocks, report_facts
 from charnerf.reconstruction.turntable import render_around, write_film
 from charnerf.reporting.document import write_report
 
 MOST_VIEWS = 12
-MESH_STEPS = 12  # of the progress bar, beside one a frame: what a mesh takes, about
 
 
 @dataclass(frozen=True)
@@ -96,14 +95,20 @@ def reconstruct(
     """
     check_folder(output)
     seconds: dict[str, float] = {}
-    with _timed(seconds, "encode"):
-        hero, drawings = _encoded(model, given, reading, say)
-    hero, refined = _refined(model, hero, options.refine_seconds, seconds, say)
-    pictures, built = _pictures_and_mesh(hero.symmetric() if options.symmetric else hero, options, seconds)
+    with Progress("reconstruct", reconstruction_stages(options), in_seconds=True) as progress:
+        with _timed(seconds, "encode"):
+            hero, drawings = _encoded(model, given, reading, say)
+        hero, refined = _refined(model, hero, options.refine_seconds, seconds, say, progress)
+        pictures, built = _pictures_and_mesh(
+            hero.symmetric() if options.symmetric else hero, options, seconds, progress
+        )
+        progress.stage("files")
+        with write_folder_aside(output) as folder:
+            made = _write(
+                folder, pictures, built, drawings, sheet, refined, seconds, model.source.name, options
+            )
     for line in (f"{mesh_words(built)}.", *mesh_sentences(built)):
         say(line)
-    with write_folder_aside(output) as folder:
-        made = _write(folder, pictures, built, drawings, sheet, refined, seconds, model.source.name, options)
     for other in {"turntable.mp4", "turntable.gif"} - {made.film.name}:  # of a reconstruction before
         (output / other).unlink(missing_ok=True)
     return _moved(made, output)
@@ -154,28 +159,30 @@ def _refined(
     time_limit: float | None,
     seconds: dict[str, float],
     say: Callable[[str], object],
+    progress: Progress,
 ) -> tuple[Hero, Finetuned | None]:
     """The character by weights adapted to its drawings, where there is time for that, and how they were adapted."""
     if time_limit is None:
         return hero, None
+    progress.stage("refine")
     with _timed(seconds, "refine"):
-        refined = refine(model, hero, time_limit)
+        refined = refine(model, hero, time_limit, progress=progress)
     for line in summary_lines(refined):
         say(line)
     return refined.hero, refined
 
 
 def _pictures_and_mesh(
-    hero: Hero, options: ReconstructionOptions, seconds: dict[str, float]
+    hero: Hero, options: ReconstructionOptions, seconds: dict[str, float], progress: Progress
 ) -> tuple[list[np.ndarray], BuiltMesh]:
-    """Pictures from around, RGBA uint8, and the mesh, with a progress bar."""
-    with tqdm(total=float(options.frames + MESH_STEPS), desc="reconstruct", bar_format=BAR) as bar:
-        with _timed(seconds, f"{options.frames} frames of {options.size} pixels"):
-            pictures = render_around(hero, options.frames, options.size, on_frame=bar.update)
-        with _timed(seconds, "mesh"):
-            on_points = meter(bar, (options.mesh.resolution,), MESH_STEPS)
-            built = hero.build_mesh(options.mesh, on_points=on_points)
-        bar.update((bar.total or 0) - bar.n)
+    """Pictures from around, RGBA uint8, and the mesh."""
+    progress.stage("pictures")
+    with _timed(seconds, f"{options.frames} frames of {options.size} pixels"):
+        on_frame = progress.counter(options.frames)
+        pictures = render_around(hero, options.frames, options.size, on_frame=on_frame)
+    progress.stage("mesh")
+    with _timed(seconds, "mesh"):
+        built = hero.build_mesh(options.mesh, on_points=meter(progress, (options.mesh.resolution,)))
     return pictures, built
 
 

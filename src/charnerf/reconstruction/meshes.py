@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tqdm import tqdm
-
 from charnerf.files import write_text
 from charnerf.inference.hero import Hero
 from charnerf.meshing.build import BuiltMesh
@@ -15,10 +13,9 @@ from charnerf.meshing.export import TEXTURED_SUFFIXES, save_mesh
 from charnerf.meshing.lod import Lod, lod_report, named
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
-from charnerf.reconstruction.progress import BAR, meter
+from charnerf.progress import Progress
+from charnerf.reconstruction.progress import mesh_seconds, meter
 from charnerf.reconstruction.report import level_lines, mesh_sentences, mesh_words
-
-STEPS = 20.0  # of the progress bar
 
 
 @dataclass(frozen=True)
@@ -57,10 +54,8 @@ def write_mesh(
         DependencyError: If the format needs a library that is missing.
         NumericalError: If the field is empty or not finite.
     """
-    with tqdm(total=STEPS, desc=name, bar_format=BAR) as bar:
-        on_points = meter(bar, (options.resolution,), 0.8 * STEPS)
-        built = hero.build_mesh(options, on_points=on_points)
-        bar.update((bar.total or 0) - bar.n)
+    with Progress(name, {name: mesh_seconds(options)}, in_seconds=True) as progress:
+        built = hero.build_mesh(options, on_points=meter(progress, (options.resolution,)))
     return _write(hero, name, output, {name: built}, suffix)
 
 
@@ -89,10 +84,11 @@ def write_lods(
         ConfigError: If a grid or a number of faces is out of range.
         DataError: As of `write_mesh`, and NumericalError and DependencyError.
     """
-    with tqdm(total=STEPS, desc=name, bar_format=BAR) as bar:
-        on_points = meter(bar, resolutions, 0.8 * STEPS)
-        levels = hero.lods(options, resolutions=resolutions, faces=faces, on_points=on_points)
-        bar.update((bar.total or 0) - bar.n)
+    seconds = sum(mesh_seconds(replace(options, resolution=one, faces=None)) for one in resolutions)
+    with Progress(name, {name: seconds}, in_seconds=True) as progress:
+        levels = hero.lods(
+            options, resolutions=resolutions, faces=faces, on_points=meter(progress, resolutions)
+        )
     lods = named(levels, name)
     files = _write(hero, name, output, {file: lod.built for file, lod in lods.items()}, suffix)
     write_text(output / "lods.md", lod_report(lods))

@@ -1,18 +1,43 @@
-"""The progress bar of commands that make meshes: what a mesh takes is known only about."""
+"""What the stages of making pictures and meshes take, for the time left; nothing but that depends on it."""
 
+import math
 from collections.abc import Callable, Sequence
 
-from tqdm import tqdm
+from charnerf.meshing.options import MeshOptions
+from charnerf.progress import Progress
+from charnerf.reconstruction.options import ReconstructionOptions
 
-MESH_POINTS = 0.06  # of the grid: evaluated in the usual case; only the progress bar depends on it
-BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}, about {remaining} left"
+# seconds on two cores
+ENCODE, WRITE = 1.0, 3.0
+FRAME = 0.85  # of 192 pixels
+SURFACE = 10.0  # of a grid of 128
+TEXTURE = 1.0 / 4000.0  # a face
+ALL_FACES = 30_000  # of a grid of 128
+MESH_POINTS = 0.1  # of the grid, evaluated in the usual case
 
 
-def meter(bar: tqdm, resolutions: Sequence[int], steps: float) -> Callable[[int], None]:
-    """Turn numbers of evaluated points into about so many steps of the bar, which stops short of its end."""
-    per_point = steps / (MESH_POINTS * sum(resolution**3 for resolution in resolutions))
+def reconstruction_stages(options: ReconstructionOptions) -> dict[str, float]:
+    """Seconds that each stage of a reconstruction takes, about."""
+    refine = {} if options.refine_seconds is None else {"refine": options.refine_seconds}
+    pictures = {"pictures": options.frames * FRAME * (options.size / 192.0) ** 2}
+    return {"encode": ENCODE, **refine, **pictures, "mesh": mesh_seconds(options.mesh), "files": WRITE}
+
+
+def mesh_seconds(options: MeshOptions) -> float:
+    """Seconds that a mesh takes, about."""
+    scale = options.resolution / 128.0
+    faces = ALL_FACES * scale**2 if options.faces is None else options.faces
+    return SURFACE * scale**2.5 + (0.0 if options.texture == "vertex" else TEXTURE * faces)
+
+
+def meter(progress: Progress, resolutions: Sequence[int]) -> Callable[[int], None]:
+    """Turn numbers of evaluated points into the share of a stage: how many there will be is known only about."""
+    expected = MESH_POINTS * sum(resolution**3 for resolution in resolutions)
+    total = 0
 
     def step(count: int) -> None:
-        bar.update(max(0.0, min(count * per_point, (bar.total or 0) - 0.5 - bar.n)))
+        nonlocal total
+        total += count
+        progress.update(0.8 * -math.expm1(-total / expected))
 
     return step

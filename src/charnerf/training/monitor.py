@@ -10,11 +10,11 @@ import lightning as L
 import torch
 from lightning.pytorch.loggers import TensorBoardLogger
 from torch import Tensor
-from tqdm import tqdm
 
 from charnerf.data.validation import ValidationView
 from charnerf.files import write_text
 from charnerf.pictures import on_white
+from charnerf.progress import Progress
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
 from charnerf.types import RenderOutput
@@ -33,7 +33,7 @@ PICTURES = 4
 
 @final
 class BudgetBar(L.Callback):
-    """One bar over the whole budget; tqdm's estimate is the time left.
+    """Progress over the whole budget, with the time left.
 
     Args:
         clock: Of the run.
@@ -41,40 +41,41 @@ class BudgetBar(L.Callback):
 
     def __init__(self, *, clock: RunClock) -> None:
         self.clock = clock
-        self.bar: Any = None
+        self.progress: Progress | None = None
+        self.begun = 0.0  # where a resumed run goes on
 
     def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        """Open the bar."""
-        by_steps = self.clock.budget_seconds is None
-        total = self.clock.budget_steps if by_steps else self.clock.budget_seconds
-        done = (
-            self.clock.steps if by_steps else self.clock.seconds
-        )  # of a resumed run; rounded up, time left is negative
-        self.bar = tqdm(
-            total=round(total or 0),
-            initial=done,
-            desc="training",
-            unit="step" if by_steps else "s",
-            bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} {unit}, left {remaining}{postfix}",
-            mininterval=1.0,
-        )
+        """Begin to show it."""
+        if not trainer.is_global_zero:
+            return
+        in_seconds = self.clock.budget_seconds is not None
+        total = float(self.clock.budget_seconds or self.clock.budget_steps or 1)
+        self.begun = min(self._spent(), total)
+        stages = {"training": total - self.begun}
+        self.progress = Progress("training", stages, in_seconds=in_seconds, begun=self.begun / total)
+        self.progress.__enter__()
 
     def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
-        """Move it."""
-        now = self.clock.steps if self.clock.budget_seconds is None else self.clock.seconds
-        self.bar.n = min(now, self.bar.total)
+        """Go on."""
+        if self.progress is None:
+            return
+        rest, note = self.progress.costs["training"], None
         if self.clock.steps % 10 == 0:
             loss = trainer.callback_metrics.get("train/loss/total")
             best = trainer.callback_metrics.get("val/psnr_foreground")
-            shown = {"step": self.clock.steps, "loss": f"{float(loss):.4f}" if loss is not None else "-"}
-            if best is not None:
-                shown["val_fg"] = f"{float(best):.2f} dB"
-            self.bar.set_postfix(shown, refresh=False)
-            self.bar.refresh()
+            note = f"step {self.clock.steps}, loss {'-' if loss is None else f'{float(loss):.4f}'}"
+            note += "" if best is None else f", val {float(best):.2f} dB on the foreground"
+        self.progress.update((self._spent() - self.begun) / rest if rest else 1.0, note)
 
-    def on_train_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        """Close it."""
-        self.bar.close()
+    def teardown(self, trainer: L.Trainer, pl_module: L.LightningModule, stage: str) -> None:
+        """Leave the terminal as it was, however training ended."""
+        if self.progress is not None:
+            self.progress.close()
+            self.progress = None
+
+    def _spent(self) -> float:
+        """Of the budget, in its unit."""
+        return float(self.clock.steps if self.clock.budget_seconds is None else self.clock.seconds)
 
 
 @final
