@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from charnerf.capture.procedural_data import generate_dataset
+from charnerf.cli.train import main as train
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import named_full_disk
 from charnerf.inference.checkpoint_file import read_checkpoint, write_checkpoint
@@ -147,6 +148,28 @@ def test_a_checkpoint_that_does_not_say_whose_it_is_begins_nothing(figure_datase
         run_training(cfg, tmp_path)
 
 
+def test_what_was_typed_is_kept_once_a_run_is_accepted(figure_dataset, tmp_path, monkeypatch, capsys):
+    """Hydra would write it before the run is refused, and print all overrides before the message."""
+    typed = ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={figure_dataset}", "ckpt_path=last"]
+    typed += [f"hydra.run.dir={tmp_path}", "hydra/job_logging=none", "hydra/hydra_logging=none"]
+    monkeypatch.setattr(sys, "argv", ["train.py"])
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "run_training", lambda cfg, folder, *, accepted: accepted())
+        assert train([*typed, "seed=1"]) == 0
+    kept = {file.name: file.read_text() for file in (tmp_path / ".hydra").iterdir()}
+    assert (
+        sorted(kept) == ["config.yaml", "hydra.yaml", "overrides.yaml"] and "seed=1" in kept["overrides.yaml"]
+    )
+    write_steps(tmp_path, last=3)
+    capsys.readouterr()
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # the door has set it
+    assert train([*typed, "seed=2"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("error: ckpt_path: ") and "does not say of which run it is" in told
+    assert {file.name: file.read_text() for file in (tmp_path / ".hydra").iterdir()} == kept
+
+
 def test_a_run_that_goes_on_from_the_one_before_ends_as_the_straight_one(figure_dataset, tmp_path, no_finish):
     cfg = small_runs.smoke_config(figure_dataset, *SMALL)
     run_training(cfg, tmp_path / "straight")
@@ -181,9 +204,10 @@ def test_a_disk_that_takes_no_checkpoint_is_one_message_and_status_1(figure_data
         check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
     )
-    assert done.returncode == 1
+    assert done.returncode == 1, done.stderr
     errors = [line for line in done.stderr.decode().splitlines() if line.startswith("error: ")]
-    assert len(errors) == 1 and "the checkpoint can not be written (File too large)" in errors[0]
+    assert len(errors) == 1, done.stderr
+    assert "the checkpoint can not be written (File too large)" in errors[0]
     assert b"Traceback" not in done.stderr
     assert not list((tmp_path / "run/checkpoints").iterdir())
 

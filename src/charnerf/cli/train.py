@@ -2,7 +2,8 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ from charnerf.process import (
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
+Job = Callable[["DictConfig"], None]
 HYDRA_READS_ALL = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
 
 
@@ -58,33 +60,54 @@ def main(arguments: Sequence[str], *, conf: Path | None = None) -> int:
 
 
 def _train(arguments: list[str], conf: Path) -> None:
-    """Train a run; or a grid, and report over it, also if some of its cells failed."""
+    """Train a run, or a grid."""
     import hydra
 
     from charnerf.config.grid import grid_command
-    from charnerf.config.hydra_internals import options_first
+    from charnerf.config.job_files import run_arguments
+
+    train = hydra.main(version_base="1.3", config_path=str(conf), config_name="train")
+    grid = grid_command(arguments)
+    sys.argv[1:] = run_arguments(arguments) if grid is None else grid.arguments  # where Hydra reads them
+    if grid is None:
+        _train_run(train)
+    else:
+        _train_grid(train(run_job), grid.folder)
+
+
+def _train_run(train: Callable[[Job], Callable[[], object]]) -> None:
+    """Train a run; its error goes past Hydra, which would print the overrides before it."""
+    failed: list[Exception] = []
+
+    def job(cfg: "DictConfig") -> None:
+        try:
+            run_job(cfg)
+        except Exception as error:
+            failed.append(error)
+
+    train(job)()
+    if failed:
+        raise failed[0]
+
+
+def _train_grid(train: Callable[[], object], folder: Path) -> None:
+    """Train a grid, and report over it, also if some of its cells failed."""
     from charnerf.errors import GridError
     from charnerf.training.grid import begin_grid, check_grid, is_lost_worker, report_grid
 
-    train = hydra.main(version_base="1.3", config_path=str(conf), config_name="train")(run_job)
-    grid = grid_command(arguments)
-    sys.argv[1:] = options_first(arguments) if grid is None else grid.arguments  # where Hydra reads them
-    if grid is None:
-        train()
-        return
-    since = begin_grid(grid.folder)
+    since = begin_grid(folder)
     try:
         train()
     except Exception as error:
         if is_lost_worker(error):
             raise GridError(
-                f"{grid.folder}: a process of the launcher was killed, which ended the others, expected all to live; was there"
+                f"{folder}: a process of the launcher was killed, which ended the others, expected all to live; was there"
                 " memory enough? The same command goes on with what is not done."
             ) from error
         raise
     finally:
-        report_grid(grid.folder)
-    check_grid(grid.folder, since=since)
+        report_grid(folder)
+    check_grid(folder, since=since)
 
 
 def run_job(cfg: "DictConfig") -> None:
@@ -102,6 +125,7 @@ def _run_job(cfg: "DictConfig") -> None:
     from hydra.types import RunMode
 
     from charnerf.config import validate
+    from charnerf.config.job_files import save_job
     from charnerf.config.overrides import trusted_by
     from charnerf.training.cells import run_cell
     from charnerf.training.run import run_training
@@ -113,4 +137,4 @@ def _run_job(cfg: "DictConfig") -> None:
     if job.mode is RunMode.MULTIRUN:
         run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder)
     else:
-        run_training(cfg, folder)
+        run_training(cfg, folder, accepted=partial(save_job, folder, cfg))

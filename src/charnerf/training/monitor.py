@@ -77,6 +77,13 @@ class BudgetBar(L.Callback):
         """Of the budget, in its unit."""
         return float(self.clock.steps if self.clock.budget_seconds is None else self.clock.seconds)
 
+    def on_exception(
+        self, trainer: L.Trainer, pl_module: L.LightningModule, exception: BaseException
+    ) -> None:
+        """End its line, so that the message begins one."""
+        if self.bar is not None:
+            self.bar.close()
+
 
 @final
 class CurveWriter(L.Callback):

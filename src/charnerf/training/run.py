@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,12 +34,13 @@ START_FILE = "start.txt"  # where the weights of a run began, if that was not ra
 
 
 @restored_threads()
-def run_training(cfg: DictConfig, folder: Path) -> None:
+def run_training(cfg: DictConfig, folder: Path, *, accepted: Callable[[], object] = lambda: None) -> None:
     """Train, evaluate and report into a run folder.
 
     Args:
         cfg: Composed and validated.
         folder: The run folder (design: On disk); made if it is missing.
+        accepted: Called before training, once nothing in the folder speaks against it.
     """
     logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)  # the bar and the report say the rest
     L.seed_everything(cfg.seed, verbose=False)
@@ -56,6 +57,7 @@ def run_training(cfg: DictConfig, folder: Path) -> None:
     start = begin(model, cfg) if checkpoint is None else None
     root = source.prepare(depth=needs.depth)
     identity = _identity(cfg, folder, root, before)
+    accepted()
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = build_module(cfg, model, renderer, losses, clock)
