@@ -8,10 +8,15 @@ from pathlib import Path
 
 from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
 
-from charnerf.config.bounds import MOST_BYTES, check_yaml
 from charnerf.config.composition import compose_unchecked
+from charnerf.config.given_folders import (
+    check_hydra,
+    given_search_path,
+    hydras_settings,
+    typed_settings,
+    with_search_path,
+)
 from charnerf.config.hydra_internals import looks_only, read_arguments
 from charnerf.config.overrides import config_files, jobs_of, trusted_by
 from charnerf.config.validation import check_files, validate, warn_of_idle_settings
@@ -27,20 +32,22 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
         ConfigError: Lists what is wrong with the first job that has a problem, and how many others have.
     """
     args = read_arguments(arguments)
-    if looks_only(args):
-        return
     name = (args.config_name or "train").removesuffix(".yaml")
     folder = Path(args.config_path).resolve() if args.config_path else conf
-    for own in (one for one in (args.config_path, args.config_dir) if one):
-        check_config_files(Path(own))
-    more = [f"hydra.searchpath=[{Path(args.config_dir).resolve().as_uri()}]"] if args.config_dir else []
+    given = given_search_path(args, name)
+    if looks_only(args):
+        return
+    typed = typed_settings(args.overrides, conf) if given or args.config_path else None
     broken: list[tuple[list[str], ConfigError]] = []
     with config_files(folder):
         jobs = jobs_of(args.overrides) if args.multirun else [list(args.overrides)]
         for job in jobs:
             try:
-                cfg = compose_unchecked(name, more + job)
+                overrides = with_search_path(job, given)
+                cfg = compose_unchecked(name, overrides)
                 validate(cfg, trusted_targets=trusted_by(job))
+                if typed is not None:
+                    check_hydra(typed, hydras_settings(name, overrides))
                 check_files(cfg)
                 warn_of_idle_settings(cfg)
             except ConfigError as error:
@@ -53,22 +60,6 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
     raise ConfigError(
         f"{len(broken)} of {len(jobs)} jobs can not start, so none was; first `{' '.join(first)}`:\n{problem}"
     ) from problem
-
-
-def check_config_files(folder: Path) -> None:
-    """Check that config files are small when their anchors are expanded, before Hydra expands them.
-
-    Raises:
-        ConfigError: If one is not, or is no YAML.
-    """
-    for file in sorted(folder.rglob("*.yaml")):
-        try:
-            with file.open("rb") as opened:
-                check_yaml(opened.read(MOST_BYTES + 1), str(file))
-        except YAMLError as error:
-            raise ConfigError(
-                f"{file}: can not be read ({' '.join(str(error).split())[:200]}), expected YAML."
-            ) from error
 
 
 def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: Path) -> int:
