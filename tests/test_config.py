@@ -214,6 +214,12 @@ def test_own_classes_are_trusted_from_the_command_line_only(
     )
 
 
+@pytest.mark.parametrize("name", ["../x", "/x", "a/b", "..", ".", "''", "a\\b", "x" * 200])
+def test_a_name_is_no_path(name: str) -> None:
+    with pytest.raises(ConfigError, match=r"^name: found .*expected a folder's own name"):
+        compose_config(["scale=smoke", f"name={name}"])
+
+
 def test_combinations_that_can_not_work_are_named() -> None:
     assert (
         problem("combinator=sa", "combinator.num_heads=3")

@@ -19,6 +19,7 @@ from charnerf.errors import CharNeRFError, ConfigError, DataError
 from charnerf.inference.build import build_model
 from charnerf.inference.weights import FORMAT, save_config, save_weights
 from charnerf.training.start import begin
+from support.work import little_work
 
 SLOTS = (
     "renderer.memory_mib",
@@ -172,10 +173,8 @@ def test_sizes_of_a_config_take_no_memory_and_no_time(
     key: str, value: object, weights: Path, tmp_path: Path
 ) -> None:
     one = with_config(weights, changed_at(config_of(weights), key, value), tmp_path)
-    begun = time.perf_counter()
-    with pytest.raises(CharNeRFError, match=rf"{key}|its config can not|metadata|do not fit"):
+    with little_work(), pytest.raises(CharNeRFError, match=rf"{key}|its config can not|metadata|do not fit"):
         charnerf.load(one)
-    assert time.perf_counter() - begun < 3.0
 
 
 @pytest.mark.parametrize(
@@ -252,9 +251,8 @@ def test_options_that_no_machine_does_are_refused_at_once(
         "-o",
         str(tmp_path / "o"),
     ]
-    begun = time.perf_counter()
-    assert run([*mesh, *options]) == status
-    assert time.perf_counter() - begun < 5.0
+    with little_work():
+        assert run([*mesh, *options]) == status
     assert "--debug" not in capsys.readouterr().err
 
 
@@ -278,10 +276,10 @@ def test_folders_that_can_not_be_written_to_are_named_before_the_work(
         ["evaluate", str(weights), *data, "--json", f"{output}/x.json"],
         ["check", str(weights), *data, "-o", output],
         ["generate", "-o", output],
+        ["capture", str(figure_dataset / "twin/mesh/mesh.obj"), "-o", output],
+        ["gallery", str(figure_dataset / "twin/sources"), "-o", f"{output}/x.png", "--weights", str(weights)],
     ):
-        begun = time.perf_counter()
-        assert run(command) == 1
-        assert (
-            f"error: {output[:100]}" in (told := capsys.readouterr().err) and "can not be written to" in told
-        )
-        assert time.perf_counter() - begun < 3.0
+        with little_work():
+            assert run(command) == 1
+        told = capsys.readouterr().err
+        assert f"error: {output[:100]}" in told and "can not be written to" in told, command

@@ -21,6 +21,7 @@ from charnerf.capture.variants import SEPARATOR, variant
 from charnerf.data.characters import CharacterPictures, remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name
 from charnerf.errors import CharNeRFError, DataError
+from charnerf.files import check_folder
 from charnerf.interruption import held
 from charnerf.progress import Progress
 from charnerf.surfaces.mesh_files import write_surface_mesh
@@ -84,11 +85,11 @@ def capture_dataset(
         What was captured, and what failed: a bad mesh does not stop the others.
 
     Raises:
-        DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set.
+        DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set or can not be written to.
         ConfigError: Before any work, if up and facing are no axes.
     """
     options, files, root = options or CaptureOptions(), expand_mesh_paths(mesh_paths), Path(root)
-    _check_call(files, split, up, facing)
+    _check_call(files, root, split, up, facing)
     items = _items(files, variants, swaps, drawn)
     note = unfinished.note_of(root, files, split, made_by(options), up, facing, variants, swaps, drawn, seed)
     skipped = _make_room(root, split, items, note)
@@ -189,8 +190,9 @@ def _items(files: Sequence[Path], variants: int, swaps: int, drawn: int) -> list
     return items or [_Item(file) for file in files]
 
 
-def _check_call(files: Sequence[Path], split: str, up: str | None, facing: str | None) -> None:
+def _check_call(files: Sequence[Path], root: Path, split: str, up: str | None, facing: str | None) -> None:
     check_name("split", split)
+    check_folder(root)
     for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
         axes_rotation(*file_axes(suffix, up, facing))
 

@@ -30,7 +30,9 @@ def command(
     trust: Trusted = None,
 ) -> None:
     """Reconstruct several characters into one picture: a row each, the drawings, then views from between them."""
+    from charnerf.files import check_folder
     from charnerf.reconstruction.gallery import write_gallery
 
+    check_folder(output.parent)
     model = load_model(weights, device=device, trust=trust)
     say(f"gallery: {write_gallery(model, folders, output, size=size)}")

@@ -8,6 +8,8 @@ from hydra.utils import get_object
 from charnerf.errors import ConfigError
 from charnerf.schedule import Phase, PhaseSchedule
 
+LONGEST_NAME = 120  # characters
+
 Rule = Callable[..., Iterator[tuple[str, str]]]
 
 
@@ -22,6 +24,17 @@ def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[t
 def _lr_scale_is_positive(lr_scale: float) -> Iterator[tuple[str, str]]:
     if not lr_scale > 0:
         yield "combinator.lr_scale", f"found {lr_scale}, expected more than 0."
+
+
+def _names_a_folder(name: str) -> Iterator[tuple[str, str]]:
+    is_one = (
+        name.isprintable() and not set("/\\") & set(name) and name.strip(". ") and len(name) <= LONGEST_NAME
+    )
+    if not is_one:
+        yield (
+            "name",
+            f"found {name[:60]!r}, expected a folder's own name, no path: run folders lie in outputs/NAME.",
+        )
 
 
 def _something_ends_the_run(steps: int | None, seconds: float | None) -> Iterator[tuple[str, str]]:
@@ -76,6 +89,7 @@ def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
 
 
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
+    (("name",), _names_a_folder),
     (("combinator.num_heads", "model.width", "combinator.attention_width"), _heads_divide_width),
     (("combinator.lr_scale",), _lr_scale_is_positive),
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
