@@ -14,6 +14,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from charnerf.data.json_values import count, number, section, shown
 from charnerf.data.layout import TRANSFORMS_FILE, check_view_name, read_json
 from charnerf.errors import DataError
 from charnerf.files import inside
@@ -21,9 +22,7 @@ from charnerf.types import Cameras
 
 MOST_SOURCES = 64  # views of a character that a model reads
 MOST_FRAMES = 10_000  # of a character
-MOST_PIXELS = 16_384  # a side
 AABB_SCALE = 4  # instant-ngp's box of 4 units holds cameras and character under its default scale and offset
-_LARGEST = 1e30  # of any number of a camera
 _DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 
 
@@ -114,23 +113,23 @@ def read_transforms(folder: Path) -> CharacterFiles:
     content = read_json(path)
     frames = content.get("frames")
     if not isinstance(frames, list) or not frames:
-        raise DataError(f"{path}: frames: found {_short(frames)}, expected a list of at least one frame.")
+        raise DataError(f"{path}: frames: found {shown(frames)}, expected a list of at least one frame.")
     if len(frames) > MOST_FRAMES:
         raise DataError(f"{path}: frames: found {len(frames)}, expected at most {MOST_FRAMES}.")
-    merged = [{**content, **_object(path, f"frames[{index}]", frame)} for index, frame in enumerate(frames)]
+    merged = [{**content, **section(path, f"frames[{index}]", frame)} for index, frame in enumerate(frames)]
     where = [f"{path}: frames[{index}]" for index in range(len(frames))]
     depth_keys = ["depth_file_path" in frame for frame in merged]
     if any(depth_keys) and not all(depth_keys):
         raise DataError(
             f"{where[depth_keys.index(False)]}: has no depth_file_path while others have; give all or none."
         )
-    sources = _object(path, "source_views", content.get("source_views", {}))
+    sources = section(path, "source_views", content.get("source_views", {}))
     if len(sources) > MOST_SOURCES:
         raise DataError(f"{path}: source_views: found {len(sources)}, expected at most {MOST_SOURCES}.")
     for name in sources:
         check_view_name(f"{path}: source_views", name)
     source_where = [f"{path}: source_views.{name}" for name in sources]
-    source_frames = [_object(path, f"source_views.{name}", source) for name, source in sources.items()]
+    source_frames = [section(path, f"source_views.{name}", source) for name, source in sources.items()]
     if not sources:
         raise DataError(
             f"{path}: has no source_views, expected at least one of front, side, back; capture it again."
@@ -154,7 +153,7 @@ def check_pose(where: str, matrix: Any) -> Tensor:
     try:
         pose = torch.tensor(matrix, dtype=torch.float64)
     except (TypeError, ValueError, RuntimeError, OverflowError) as err:
-        raise DataError(f"{where}: found {_short(matrix)}, expected a 4x4 matrix of numbers.") from err
+        raise DataError(f"{where}: found {shown(matrix)}, expected a 4x4 matrix of numbers.") from err
     if pose.shape != (4, 4):
         raise DataError(f"{where}: found shape {tuple(pose.shape)}, expected a 4x4 matrix.")
     if not bool(pose.isfinite().all()):
@@ -175,7 +174,7 @@ def check_pose(where: str, matrix: Any) -> Tensor:
 
 def _cameras(where: Sequence[str], frames: Sequence[Mapping[str, Any]]) -> Cameras:
     sizes = [
-        (_count(place, frame, "w"), _count(place, frame, "h"))
+        (count(place, frame, "w"), count(place, frame, "h"))
         for place, frame in zip(where, frames, strict=True)
     ]
     for place, size in zip(where, sizes, strict=True):
@@ -187,8 +186,8 @@ def _cameras(where: Sequence[str], frames: Sequence[Mapping[str, Any]]) -> Camer
     focals, centres, poses, models = [], [], [], []
     for place, frame in zip(where, frames, strict=True):
         _refuse_distortion(place, frame)
-        focals.append(_focal(place, frame, width))
-        centres.append((_number(place, frame, "cx", 0.5 * width), _number(place, frame, "cy", 0.5 * height)))
+        focals.append(focal_lengths(place, frame, width))
+        centres.append((number(place, frame, "cx", 0.5 * width), number(place, frame, "cy", 0.5 * height)))
         poses.append(check_pose(f"{place}.transform_matrix", frame.get("transform_matrix")))
         models.append(_is_orthographic(place, frame))
     return Cameras(
@@ -201,15 +200,20 @@ def _cameras(where: Sequence[str], frames: Sequence[Mapping[str, Any]]) -> Camer
     )
 
 
-def _focal(where: str, frame: Mapping[str, Any], width: int) -> tuple[float, float]:
+def focal_lengths(where: str, frame: Mapping[str, Any], width: int) -> tuple[float, float]:
+    """Focal lengths of a frame, pixels, said as such or as camera_angle_x, radians.
+
+    Raises:
+        DataError: If they are missing or not positive.
+    """
     if "fl_x" not in frame and "camera_angle_x" in frame:
-        angle = _number(where, frame, "camera_angle_x", 0.0)
+        angle = number(where, frame, "camera_angle_x", 0.0)
         if not 0.0 < angle < math.pi:
             raise DataError(f"{where}.camera_angle_x: found {angle}, expected radians between 0 and pi.")
         focal_x = 0.5 * width / math.tan(0.5 * angle)
     else:
-        focal_x = _number(where, frame, "fl_x", None)
-    focal_y = _number(where, frame, "fl_y", focal_x)
+        focal_x = number(where, frame, "fl_x", None)
+    focal_y = number(where, frame, "fl_y", focal_x)
     if not (focal_x > 0.0 and focal_y > 0.0):
         raise DataError(f"{where}: found fl_x = {focal_x}, fl_y = {focal_y}, expected positive pixels.")
     return focal_x, focal_y
@@ -237,7 +241,7 @@ def _files(
     for place, frame in zip(where, frames, strict=True):
         name = frame.get(key)
         if not isinstance(name, str) or not name:
-            raise DataError(f"{place}.{key}: found {_short(name)}, expected a file relative to {folder}.")
+            raise DataError(f"{place}.{key}: found {shown(name)}, expected a file relative to {folder}.")
         file = inside(folder, name, f"{place}.{key}")
         if not file.suffix and not file.exists():
             file = inside(folder, f"{name}.png", f"{place}.{key}")
@@ -247,32 +251,3 @@ def _files(
             )
         files.append(file)
     return tuple(files)
-
-
-def _count(where: str, frame: Mapping[str, Any], key: str) -> int:
-    value = frame.get(key)
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= MOST_PIXELS:
-        raise DataError(
-            f"{where}.{key}: found {_short(value)}, expected a number of pixels, 1 or more, at most {MOST_PIXELS}."
-        )
-    return value
-
-
-def _number(where: str, frame: Mapping[str, Any], key: str, default: float | None) -> float:
-    value = frame.get(key, default)
-    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _LARGEST:
-        raise DataError(f"{where}.{key}: found {_short(value)}, expected a finite number.")
-    return float(value)
-
-
-def _object(path: Path, key: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise DataError(f"{path}: {key}: found {_short(value)}, expected an object.")
-    return value
-
-
-def _short(value: Any) -> str:
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
