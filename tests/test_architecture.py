@@ -25,7 +25,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("losses",),
     ("data", "meshing", "procedural"),
     ("capture", "evaluation"),
-    ("drawings",),
+    ("drawings", "foreign"),
     ("inference",),
     ("reporting",),
     ("finetuning",),

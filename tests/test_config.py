@@ -31,7 +31,8 @@ MODEL_GROUPS = (
 
 def overrides_for(option: Path) -> list[str]:
     overrides = [f"{option.parent}={option.stem}"]
-    return [*overrides, "data.root=/tmp"] if option.as_posix() == "data/folder.yaml" else overrides
+    needs_root = option.as_posix() in ("data/folder.yaml", "data/foreign.yaml")
+    return [*overrides, "data.root=/tmp"] if needs_root else overrides
 
 
 def problem(*overrides: str) -> str:

@@ -4,13 +4,15 @@ from typing import Annotated
 
 import typer
 
+from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.messages import say
-from charnerf.cli.options import Dataset, Folder
+from charnerf.cli.options import Folder, gathered
 
 
+@gathered(data=dataset_options)
 def command(
     *,
-    data: Dataset,
+    data: GivenDataset,
     character: Annotated[
         list[str], typer.Option(metavar="NAME", help="Character of the data set; may be given several times.")
     ],
@@ -36,7 +38,8 @@ def command(
     from charnerf.files import check_folder
 
     check_folder(output)
-    drawn = [load_character(data, name) for name in character]
+    root = data.opened()
+    drawn = [load_character(root, name) for name in character]
     for one in drawn:
         folder = output / one.name if len(drawn) > 1 else output
         files = write_drawings(draw_character(one, size=size, seed=seed, level=level), folder)

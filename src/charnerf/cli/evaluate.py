@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.drawings import reading_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Dataset, Device, Trusted, Weights, gathered, is_count
+from charnerf.cli.options import Device, Trusted, Weights, gathered, is_count
 from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import check_folder
@@ -71,10 +72,10 @@ NearestFrom = Annotated[
 ]
 
 
-@gathered(reading=reading_options)
+@gathered(data=dataset_options, reading=reading_options)
 def command(
     *,
-    data: Dataset,
+    data: GivenDataset,
     weights: Weights = None,
     split: Annotated[str, typer.Option(metavar="NAME", help="Split to measure on.")] = "test",
     views: NumViews = None,
@@ -110,7 +111,7 @@ def command(
     metrics = evaluate(
         model.network,
         model.renderer,
-        data,
+        data.opened(),
         split,
         views=num_views or run_views,
         output=output,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import (
-    Dataset,
     Device,
     Folder,
     Symmetric,
@@ -66,10 +66,10 @@ Format = Annotated[
 ]
 
 
-@gathered(mesh=mesh_options(MeshOptions()))
+@gathered(data=dataset_options, mesh=mesh_options(MeshOptions()))
 def command(
     *,
-    data: Dataset,
+    data: GivenDataset,
     output: Folder,
     character: Name = None,
     split: Split = None,
@@ -98,7 +98,7 @@ def command(
         mesh, resolution=grids[0] if grids else mesh.resolution, faces=counts[0] if counts else None
     )
     check_folder(output)
-    heroes = _heroes(data, character, split, symmetric, weights, device=device, trust=trust)
+    heroes = _heroes(data.opened(), character, split, symmetric, weights, device=device, trust=trust)
     if split is not None:
         _measure(heroes, options, output, split)
     for one, hero in heroes:

@@ -30,7 +30,13 @@ WeightsOption = Annotated[
 ]
 Dataset = Annotated[
     Path,
-    typer.Option("--data", metavar="DATASET", exists=True, file_okay=False, help="Folder with dataset.json."),
+    typer.Option(
+        "--data",
+        metavar="DATASET",
+        exists=True,
+        file_okay=False,
+        help="Folder with dataset.json; or one of nerfstudio, instant-ngp, NeRF-Blender, pixelNeRF (SRN, NMR) or CO3D.",
+    ),
 ]
 SomeDataset = Annotated[
     Path | None,

@@ -77,7 +77,11 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     ),
     "schedule": ("charnerf.schedule.PhaseSchedule",),
     "phase": ("charnerf.schedule.Phase",),
-    "data": ("charnerf.capture.procedural_data.ProceduralData", "charnerf.data.folder.FolderData"),
+    "data": (
+        "charnerf.capture.procedural_data.ProceduralData",
+        "charnerf.data.folder.FolderData",
+        "charnerf.foreign.data.ForeignData",
+    ),
     "optimizer": (
         "charnerf.training.muon.MuonWithAdam",
         *(

@@ -26,7 +26,7 @@ class FolderData(AbstractData):
         if not (self.root / DATASET_FILE).is_file():
             raise ConfigError(
                 f"data.root: found no {DATASET_FILE} in '{self.root}', expected a data set; `charnerf capture` "
-                "or `charnerf generate` makes one."
+                "or `charnerf generate` makes one, and data=foreign reads those of nerfstudio and others."
             )
         names = [name for split in read_dataset(self.root).splits.values() for name in split]
         if not names:

@@ -48,16 +48,19 @@ def transforms_text(
     """The content of transforms.json.
 
     Args:
-        cameras: Pinhole cameras (N,) of one focal length and centre.
+        cameras: Pinhole cameras (N,); where they differ in focal length or centre, each frame says its own.
         image_names: Files relative to the character's folder, N of them.
         depth_names: The same for depth, or none.
         source_cameras: Cameras (V,) of the source views.
         source_files: File of each source view by its name, in order, V of them.
     """
-    focal_x, focal_y = cameras.focal[0].tolist()
+    alike = bool((cameras.focal == cameras.focal[0]).all()) and bool(
+        (cameras.principal_point == cameras.principal_point[0]).all()
+    )
     frames = [
         {"file_path": name, "transform_matrix": cameras.world_from_camera[index].tolist()}
         | ({"depth_file_path": depth_names[index]} if depth_names else {})
+        | ({} if alike else _intrinsics(cameras[index]))
         for index, name in enumerate(image_names)
     ]
     sources = {
@@ -70,18 +73,28 @@ def transforms_text(
         for index, (name, file) in enumerate(source_files.items())
     }
     content = {
-        **_intrinsics(cameras[0]),
+        **(
+            _intrinsics(cameras[0]) if alike else {}
+        ),  # nerfstudio takes what stands here before what a frame says
         "k1": 0.0,
         "k2": 0.0,
         "p1": 0.0,
         "p2": 0.0,
-        "camera_angle_x": 2.0 * math.atan(0.5 * cameras.width / focal_x),
-        "camera_angle_y": 2.0 * math.atan(0.5 * cameras.height / focal_y),
+        **(_angles(cameras[0]) if alike else {}),
         "aabb_scale": AABB_SCALE,
         "source_views": sources,
         "frames": frames,
     }
     return json.dumps(content, indent=1) + "\n"
+
+
+def _angles(camera: Cameras) -> dict[str, float]:
+    """Fields of view of a camera of shape (), radians."""
+    focal_x, focal_y = camera.focal.tolist()
+    return {
+        "camera_angle_x": 2.0 * math.atan(0.5 * camera.width / focal_x),
+        "camera_angle_y": 2.0 * math.atan(0.5 * camera.height / focal_y),
+    }
 
 
 def _intrinsics(camera: Cameras) -> dict[str, float]:
