@@ -4,6 +4,7 @@
 """
 
 import ctypes
+import multiprocessing
 import os
 import threading
 from functools import cache
@@ -49,6 +50,11 @@ def leave_disk_errors_to_callers() -> None:
             others(failure)
 
     threading.excepthook = hook
+
+
+def start_processes_as_usual() -> None:
+    """Let a launcher's process start others as Python does: joblib leaves `loky` as the way, which those do not know."""
+    multiprocessing.set_start_method(None, force=True)
 
 
 @cache

@@ -15,6 +15,7 @@ from charnerf.process import (
     keep_freed_memory,
     leave_disk_errors_to_callers,
     limit_spinning,
+    start_processes_as_usual,
     use_fastest_products,
 )
 
@@ -114,6 +115,7 @@ def run_job(cfg: "DictConfig") -> None:
     """One job, perhaps in a process that a launcher began: training, evaluation, report."""
     if not is_listening():  # a launcher's
         end_with_parent()
+        start_processes_as_usual()
     with listening():
         _run_job(cfg)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from hydra import compose
 from hydra.errors import HydraException
-from omegaconf import OmegaConf
+from omegaconf import ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
@@ -49,8 +49,10 @@ def given_search_path(args: Namespace, name: str) -> list[str]:
     Raises:
         ConfigError: If a file is too large or no YAML, or the primary file adds folders of its own.
     """
-    typed = [one for one in parse_overrides(_hydras(args.overrides)) if one.key_or_group == SEARCH_PATH]
-    entries = [str(entry) for one in typed for entry in OmegaConf.create(one.value() or [])]
+    typed = [
+        one.value() for one in parse_overrides(_hydras(args.overrides)) if one.key_or_group == SEARCH_PATH
+    ]
+    entries = [str(entry) for value in typed if isinstance(value, list) for entry in ListConfig(value)]
     if args.config_dir:
         entries.append(f"file://{Path(args.config_dir).resolve()}")
     folders = [Path(one.removeprefix("file://")) for one in entries if not one.startswith("pkg://")]

@@ -15,7 +15,11 @@ from charnerf.config.overrides import parse_overrides
 from charnerf.config.schema import LIST_GROUPS
 
 GRIDS = Path("outputs/grid")
-SETTABLE = ("hydra.sweep.dir", "hydra.job.config.override_dirname.exclude_keys")
+SETTABLE = (
+    "hydra.sweep.dir",
+    "hydra.job.config.override_dirname.exclude_keys",
+    "hydra.launcher.submitit_folder",
+)
 NOT_OF_A_CELL = ("ckpt_path",)  # where a run begins, not what it is
 
 
@@ -63,6 +67,11 @@ def grid_command(arguments: Sequence[str]) -> GridCommand | None:
     if swept and SETTABLE[1] not in parsed:
         fixed = ",".join(f"'{key}'" for key in own if key not in swept)
         more.append(f"{SETTABLE[1]}=[{fixed}]")
+    launcher = parsed.get("hydra/launcher")
+    if launcher is not None and str(launcher.value()).startswith("submitit") and SETTABLE[2] not in parsed:
+        more.append(
+            f"{SETTABLE[2]}='{(folder / '.submitit').as_posix()}'"
+        )  # its own holds a %j that nobody fills in
     return GridCommand([*options_first(arguments), *more], folder)
 
 

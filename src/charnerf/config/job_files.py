@@ -26,6 +26,10 @@ def save_job(folder: Path, cfg: DictConfig) -> None:
         cfg: The job's config, as Hydra composed it.
     """
     job = HydraConfig.get()
-    kept = {"config.yaml": cfg, "hydra.yaml": {"hydra": job}, "overrides.yaml": job.overrides.task}
+    kept = {
+        "config.yaml": cfg,
+        "hydra.yaml": OmegaConf.create({"hydra": job}),
+        "overrides.yaml": job.overrides.task,
+    }
     for name, content in kept.items():
-        write_text(folder / FOLDER / name, OmegaConf.to_yaml(OmegaConf.create(content)))
+        write_text(folder / FOLDER / name, OmegaConf.to_yaml(content))
