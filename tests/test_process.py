@@ -1,5 +1,6 @@
 """Settings of the process: what doors change, and that the library changes none."""
 
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -102,3 +103,10 @@ def test_what_a_thread_can_not_write_is_left_to_its_caller(monkeypatch: pytest.M
         thread.start()
         thread.join()
     assert seen == [ValueError]
+
+
+def test_processes_start_as_usual_whatever_a_launcher_has_set() -> None:
+    usual = multiprocessing.get_start_method()
+    multiprocessing.set_start_method("spawn", force=True)
+    process.start_processes_as_usual()
+    assert multiprocessing.get_start_method() == usual

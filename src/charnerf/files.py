@@ -163,6 +163,24 @@ def locked(path: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def is_locked(path: Path) -> bool:
+    """Whether another process holds a lock file now; False where there is none, or the system knows no locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    if not path.is_file():
+        return False
+    handle = os.open(path, os.O_RDWR if os.access(path, os.W_OK) else os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(handle)
+    return False
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file in UTF-8, whole or not at all; halves of characters, as names of files may hold them, are escaped."""
     with write_aside(path) as aside:

@@ -63,7 +63,19 @@ def test_what_is_not_finished_is_listed_with_its_error(grid):
     found = read_unfinished(grid)
     assert [(one.name, one.state, one.error) for one in found] == [
         ("bad", "failed", "NumericalError: <nan>"),
-        ("cut", "running or killed, 90 steps", ""),
+        ("cut", "interrupted, 90 steps", ""),
+    ]
+
+
+def test_where_nothing_is_finished_what_was_begun_is_named(grid, tmp_path):
+    for name in ("bad", "cut"):
+        shutil.copytree(grid / name, tmp_path / name)
+    with pytest.raises(DataError) as caught:
+        write_folder_report(tmp_path)
+    assert str(caught.value).splitlines() == [
+        f"{tmp_path}: found no metrics.json below it, expected finished runs; the same command goes on with what was begun:",
+        "  bad: failed, NumericalError: <nan>",
+        "  cut: interrupted, 90 steps",
     ]
 
 

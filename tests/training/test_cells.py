@@ -12,6 +12,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from charnerf.config.grid import config_hash, grid_command
 from charnerf.errors import ConfigError, GridError
+from charnerf.reporting.runs import read_unfinished
 from charnerf.training.cells import cells_of, read_cell, run_cell
 from charnerf.training.grid import begin_grid, check_grid, report_grid
 
@@ -86,6 +87,7 @@ def test_whoever_stops_the_sweep_stops_it(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         cell(tmp_path, Trainer(error=KeyboardInterrupt()))  # type: ignore[arg-type]
     assert [one.state for one in cells_of(tmp_path)] == ["interrupted"]
+    assert [one.state for one in read_unfinished(tmp_path)] == ["interrupted"]
 
 
 def test_a_cell_goes_on_from_its_own_checkpoint(tmp_path):
@@ -133,9 +135,11 @@ def test_a_cell_in_work_is_left_alone_and_a_killed_one_is_not(tmp_path):
     trainer = Trainer()
     assert cell(tmp_path, trainer).state == "running"
     assert [one.state for one in cells_of(tmp_path)] == ["running"]
+    assert [one.state for one in read_unfinished(tmp_path)] == ["running"]
     process.kill()
     process.wait()
     assert [one.state for one in cells_of(tmp_path)] == ["interrupted"]
+    assert [one.state for one in read_unfinished(tmp_path)] == ["interrupted"]
     with pytest.raises(GridError, match="interrupted"):
         check_grid(tmp_path)
     assert trainer.asked == []
@@ -178,6 +182,14 @@ def test_the_order_of_swept_values_means_nothing():
     assert folder_of("augmentation=[],[mirror,recolor]") == folder_of("augmentation=[mirror,recolor],[]")
     assert folder_of("augmentation=[],[mirror,recolor]") != folder_of("augmentation=[],[recolor,mirror]")
     assert folder_of("seed=range(0,3)") != folder_of("seed=range(0,4)")
+
+
+def test_submitit_gets_a_folder_whose_name_is_filled_in():
+    command = ["-m", "seed=0,1", "hydra.sweep.dir=mine", "hydra/launcher=submitit_local"]
+    assert "hydra.launcher.submitit_folder='mine/.submitit'" in grid_command(command).arguments
+    typed = [*command, "hydra.launcher.submitit_folder=jobs/%j"]
+    for arguments in (typed, command[:3]):
+        assert not any("mine/.submitit" in one for one in grid_command(arguments).arguments)
 
 
 def test_only_what_is_swept_names_the_cells():

@@ -1,6 +1,5 @@
 """A grid by its command: killed cells go on, failed ones are listed, by every launcher."""
 
-import importlib.util
 import json
 import os
 import shutil
@@ -101,9 +100,22 @@ LAUNCHERS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("package", LAUNCHERS)
+def test_a_grid_makes_the_characters_that_its_cells_need(tmp_path, package):
+    """Two cells at once, nothing in the cache: one makes the characters, the other waits; batches come from a process."""
+    count = ("data.train=2", "data.val=1", "data.test=1", "data.views=2", f"+data.cache={tmp_path / 'cache'}")
+    short = ("scale.steps=2", "validation.times=1", "scale.eval_views=1", "batches.workers=1")
+    command = [sys.executable, str(ROOT / "train.py"), "-m", "seed=0,1", "scale=smoke", "encoder=single"]
+    command += ["trainer=cpu", *count, *short, *LAUNCHERS[package]]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (grid,) = (tmp_path / "outputs/grid").iterdir()
+    assert [json.loads(file.read_text())["state"] for file in grid.glob("*/cell.json")] == ["done", "done"]
+    assert (grid / "report.md").is_file() and not list(grid.rglob("*%j*"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", LAUNCHERS)
 def test_a_grid_with_a_failing_cell(figure_dataset, tmp_path, package):
-    if package != "basic" and importlib.util.find_spec(f"hydra_plugins.{package}") is None:
-        pytest.skip(f"{package} is not installed")
     root = shutil.copytree(figure_dataset, tmp_path / "set")
     content = json.loads((root / "dataset.json").read_text())
     content["splits"]["broken"] = content["splits"].pop("train")

@@ -163,7 +163,6 @@ def test_a_grid_ends_with_its_processes_and_goes_on(figure_dataset, tmp_path, nu
     """The command alone gets the signal."""
     more = []
     if launcher is not None:
-        pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
         more = ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]
     grid = tmp_path / "grid"
     command = [

@@ -69,9 +69,7 @@ def write_folder_report(
     folder = Path(folder)
     runs = read_runs(folder)
     if not runs:
-        raise DataError(
-            f"{folder}: found no metrics.json below it, expected finished runs; train or evaluate first."
-        )
+        raise DataError(_nothing_finished(folder))
     rows = sorted_rows(group_rows(runs))
     title = f"charnerf: {len(rows)} rows, {len(runs)} runs in {folder.resolve().name}"
     blocks: list[Block] = [Heading(title, 1), Text(_lead(rows, runs), lead=True)]
@@ -97,6 +95,16 @@ def write_folder_report(
     blocks += lods(rows)
     blocks += characters(rows)
     return write_report(folder, title, blocks)
+
+
+def _nothing_finished(folder: Path) -> str:
+    """What there is instead of finished runs."""
+    begun = [
+        f"\n  {one.name}: {one.state}{f', {one.error}' if one.error else ''}"
+        for one in read_unfinished(folder)
+    ]
+    advice = "the same command goes on with what was begun:" if begun else "train or evaluate first."
+    return f"{folder}: found no metrics.json below it, expected finished runs; {advice}{''.join(begun)}"
 
 
 def _lead(rows: Sequence[Row], runs: Sequence[Run]) -> str:

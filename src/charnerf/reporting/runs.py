@@ -11,12 +11,13 @@ from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import DataError
 from charnerf.evaluation.records import read_record, write_record
-from charnerf.files import read_text
+from charnerf.files import is_locked, read_text
 from charnerf.inference.model import Model
 from charnerf.inference.weights import load
 from charnerf.reporting.run_files import Curve, View, read_curve, read_metrics, read_views
 
 CELL_FILE = "cell.json"  # how far a cell of a grid came; training writes it
+LOCK_FILE = ".cell.lock"  # whoever works on the cell holds it
 START_FILE = "start.txt"  # where weights began that were meant to begin pretrained; training writes it
 
 Record = TypeVar("Record")
@@ -182,4 +183,6 @@ def _cell_state(path: Path) -> tuple[str, str]:
         state, error = str(content["state"]), str(content.get("error") or "")
     except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as problem:
         return "record unreadable", str(problem)
-    return ("running or killed" if state == "running" else state), error
+    if state == "running" and not is_locked(path.with_name(LOCK_FILE)):
+        state = "interrupted"
+    return state, error

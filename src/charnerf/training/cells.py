@@ -18,12 +18,13 @@ from omegaconf import DictConfig
 
 from charnerf.config.grid import config_hash
 from charnerf.errors import DataError
-from charnerf.files import read_text, write_text
+from charnerf.files import is_locked, read_text, write_text
+from charnerf.reporting.runs import CELL_FILE, LOCK_FILE
 from charnerf.training.checkpoint import has_checkpoint
 from charnerf.training.run import run_training
 
 log = logging.getLogger(__name__)
-CELL_FILE, ERROR_FILE, LOCK_FILE, LOG_FILE = "cell.json", "error.txt", ".cell.lock", "train.log"
+ERROR_FILE, LOG_FILE = "error.txt", "train.log"
 REQUEST_FILE = ".requested"  # its time is when a sweep last asked for the cell
 DONE, RUNNING, FAILED, INTERRUPTED = "done", "running", "failed", "interrupted"
 MAX_NAME = 120  # characters of a folder's name
@@ -122,8 +123,7 @@ def cells_of(grid: Path, *, since: float = 0.0) -> list[Cell]:
         if cell is None or (request.is_file() and request.stat().st_mtime < since):
             continue
         if cell.state == RUNNING:
-            with _alone(file.parent) as is_alone:
-                state = INTERRUPTED if is_alone else RUNNING
+            state = RUNNING if is_locked(file.with_name(LOCK_FILE)) else INTERRUPTED
             cell = Cell(cell.name, state, cell.error, cell.started, cell.ended)
         cells.append(cell)
     return cells
