@@ -15,7 +15,7 @@ from charnerf.types import SourceViews
 from support import helpers
 
 ROOT = Path(__file__).resolve().parents[1]
-OPT_IN = {"gpu": "CHARNERF_TEST_GPU", "blender": "CHARNERF_TEST_BLENDER", "slow": "CHARNERF_TEST_SLOW"}
+OPT_IN = {marker: f"CHARNERF_TEST_{marker.upper()}" for marker in ("gpu", "blender", "browser", "slow")}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 import torch
-from PIL import Image
+from PIL import Image, ImageFont
 from scipy import ndimage
 from torch import Tensor
 
@@ -50,6 +50,16 @@ def read_bilinear(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
         for channel in np.moveaxis(picture, -1, 0)
     ]
     return np.stack(channels, axis=1)
+
+
+def cut_text(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: float) -> str:
+    """Text that fits into a width, pixels, its middle left out where it is longer."""
+    kept = len(text)
+    shown = text
+    while kept > 1 and font.getlength(shown) > width:
+        kept -= 1
+        shown = f"{text[: (kept + 1) // 2]}…{text[len(text) - kept // 2 :]}"
+    return shown
 
 
 @contextmanager

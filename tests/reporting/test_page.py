@@ -62,7 +62,7 @@ def test_a_gif_is_a_picture_and_warnings_stand_out(folder):
 def test_wide_tables_scroll_inside_from_the_keyboard():
     html = to_html("title", [Table(["row", "PSNR"], [["a", "1"]], emphasis=True)])
     assert (
-        '<div class="scroll" tabindex="0" role="region" aria-label="table: row, PSNR"><table class="emphasis">'
+        '<div class="scroll" tabindex="0" role="group" aria-label="table: row, PSNR"><table class="emphasis">'
         in html
     )
 

@@ -15,6 +15,7 @@ from charnerf.bench.tables import comparison_table, headline_table, rows_table
 from charnerf.bench.workbench import Workbench, workbench
 from charnerf.evaluation.environment import environment
 from charnerf.inference.model import Model
+from charnerf.wording import counted
 
 SAMPLES_PICTURE = "samples.png"
 
@@ -75,7 +76,7 @@ def _sweep_samples(
     """Rows of the sweep of samples and tolerances, and its diagram in a folder."""
     rows = sweep(sample_methods(bench), subjects, repeats=3)
     if output is not None:
-        title = f"{NUM_PIXELS} pixels of each of {len(subjects)} characters"
+        title = f"{NUM_PIXELS} pixels of each of {counted(len(subjects), 'character')}"
         plot_work_precision(rows, output / SAMPLES_PICTURE, title=title)
     return [vars(row) for row in rows]
 
@@ -86,7 +87,5 @@ def summary(result: dict[str, Any]) -> str:
     tables = [headline_table(result["headline"]), comparison_table(result["characters"])]
     if "samples" in result:
         tables.append(rows_table(result["samples"]))
-    where = (
-        f"{machine['machine']}, {machine['threads']} threads, torch {machine['torch']}, {machine['device']}"
-    )
+    where = f"{machine['machine']}, {counted(machine['threads'], 'thread')}, torch {machine['torch']}, {machine['device']}"
     return "\n\n".join([*tables, where])

@@ -8,6 +8,7 @@ import typer
 from charnerf.cli.messages import say
 from charnerf.cli.options import Depth, Jobs, NewDataset, Size, Sources, Views
 from charnerf.errors import DataError
+from charnerf.wording import counted
 
 if TYPE_CHECKING:
     from charnerf.capture.dataset import CaptureReport
@@ -106,10 +107,13 @@ def _report(done: "CaptureReport", output: Path, split: str) -> None:
 
     if done.skipped:
         say(
-            f"{len(done.skipped)} characters are there from the same capture, which was interrupted: skipped."
+            f"{counted(len(done.skipped), 'character')} skipped: there from the same capture, which was interrupted."
         )
-    say(f"{len(done.captured)} characters captured into {output}, split {split}.")
+    say(f"{counted(len(done.captured), 'character')} captured into {output}, split {split}.")
     if done.captured or done.skipped:
         say(f"{split}: digest {split_digest(output, split)}")
     if done.failed:
-        raise DataError(f"{len(done.failed)} meshes could not be captured:\n  " + "\n  ".join(done.failed))
+        raise DataError(
+            f"{counted(len(done.failed), 'mesh', 'meshes')} could not be captured:\n  "
+            + "\n  ".join(done.failed)
+        )

@@ -7,6 +7,7 @@ import typer
 from charnerf.cli.messages import say
 from charnerf.cli.options import Jobs, NewDataset, Size, Views
 from charnerf.errors import ConfigError
+from charnerf.wording import counted
 
 MOST = 1_000_000  # characters of a split
 
@@ -32,7 +33,7 @@ def command(
         raise ConfigError("--train, --val, --test: found 0 each, expected at least one character.")
     check_folder(output)
     generate_dataset(output, train, val, test, seed, views=views, size=size, processes=jobs)
-    say(f"{train + val + test} characters are in {output}.")
+    say(f"{counted(train + val + test, 'character is', 'characters are')} in {output}.")
     for split, members in read_dataset(output).splits.items():
         if members:
-            say(f"{split}: {len(members)} characters, digest {split_digest(output, split)}")
+            say(f"{split}: {counted(len(members), 'character')}, digest {split_digest(output, split)}")

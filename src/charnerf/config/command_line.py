@@ -21,6 +21,7 @@ from charnerf.config.hydra_internals import looks_only, read_arguments
 from charnerf.config.overrides import config_files, jobs_of, trusted_by
 from charnerf.config.validation import check_files, validate, warn_of_idle_settings
 from charnerf.errors import CharNeRFError, ConfigError
+from charnerf.wording import counted
 
 FAILED, WRONG_CALL = 1, 2
 
@@ -58,7 +59,7 @@ def check_command_line(arguments: Sequence[str], *, conf: Path) -> None:
     if not args.multirun:
         raise problem
     raise ConfigError(
-        f"{len(broken)} of {len(jobs)} jobs can not start, so none was; first `{' '.join(first)}`:\n{problem}"
+        f"{len(broken)} of {counted(len(jobs), 'job')} can not start, so none was; first `{' '.join(first)}`:\n{problem}"
     ) from problem
 
 

@@ -19,6 +19,7 @@ from charnerf.config.problems import Problems, join
 from charnerf.config.rules import RULES, idle_settings
 from charnerf.config.schema import MODEL_SECTIONS, RunConfig
 from charnerf.errors import ConfigError
+from charnerf.wording import counted
 
 INTERPOLATION = re.compile(r"\$\{([\w.]+)\}")
 
@@ -119,7 +120,7 @@ def as_message(lines: Sequence[str]) -> str:
     """One message for a list of problems."""
     if len(lines) == 1:
         return lines[0]
-    return "\n".join([f"The config has {len(lines)} problems:", *(f"  {line}" for line in lines)])
+    return "\n".join([f"The config has {counted(len(lines), 'problem')}:", *(f"  {line}" for line in lines)])
 
 
 def to_plain(node: Any, key: str, problems: Problems, *, names: Sequence[Any] | None = None) -> Any:

@@ -8,6 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 
 from charnerf.geometry.world import HEIGHT
+from charnerf.pictures import cut_text
 
 PANEL = 320  # pixels a side
 CAPTION = 40
@@ -34,7 +35,7 @@ def draw_assumptions(
     Returns:
         RGB uint8, (PANEL + CAPTION, PANEL * number of figures, 3), or twice as tall.
     """
-    rows = [_row(given, views, [Path(name).name[-44:] for name in names], extent)]
+    rows = [_row(given, views, [Path(name).name for name in names], extent)]
     if any(one is not other for one, other in zip(given, mended, strict=True)):
         captions = [
             "as drawn" if one is other else "reconciled; what moved is orange"
@@ -67,7 +68,7 @@ def _row(
         for y in range(0, PANEL, 8):
             draw.line((middle, y, middle, y + 3), fill=AXIS)
         draw.text((left + 4, PANEL + 3), view, fill="black", font=font)
-        draw.text((left + 4, PANEL + 20), caption, fill=(90, 90, 90), font=font)
+        draw.text((left + 4, PANEL + 20), cut_text(caption, font, PANEL - 8), fill=(90, 90, 90), font=font)
         draw.line((left, 0, left, PANEL + CAPTION), fill=(210, 210, 210))
     return np.asarray(sheet)
 

@@ -15,6 +15,7 @@ from charnerf.types import RenderOutput
 _SHEET_COLUMNS = 8
 _LABEL_WIDTH = 76
 _HEADER = 16
+_LEAST_WIDTH = 96  # of a picture, pixels
 _INK = (60, 60, 60)
 
 
@@ -83,7 +84,8 @@ def save_sheet(
     order = torch.argsort(angles.azimuth_deg).tolist()
     count = min(_SHEET_COLUMNS, len(order))
     chosen = [order[round(step * (len(order) - 1) / max(count - 1, 1))] for step in range(count)]
-    width, height = character.cameras.width, character.cameras.height
+    scale = -(-_LEAST_WIDTH // character.cameras.width)  # whole: labels need room beside small pictures
+    width, height = scale * character.cameras.width, scale * character.cameras.height
     rows = _panels(chosen, character.images(frames), pictures)
     columns = max(count, len(character.source_names))
     size = (_LABEL_WIDTH + columns * width, (len(rows) + 1) * height + 2 * _HEADER)
@@ -104,5 +106,6 @@ def save_sheet(
         y = top + _HEADER + row * height
         pen.text((4, y + height // 2), label, _INK, font)
         for column, picture in enumerate(panels):
-            sheet.paste(Image.fromarray(to_bytes(picture)), (_LABEL_WIDTH + column * width, y))
+            shown = Image.fromarray(to_bytes(picture)).resize((width, height), Image.Resampling.NEAREST)
+            sheet.paste(shown, (_LABEL_WIDTH + column * width, y))
     save_png(path, sheet)

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from charnerf.drawings.turnaround import Turnaround
-from charnerf.pictures import bytes_on_white, to_bytes
+from charnerf.pictures import bytes_on_white, cut_text, to_bytes
 
 VIEWS = 8
 _CAPTION, _GAP = 20, 12
@@ -38,7 +38,7 @@ def model_sheet(drawings: Turnaround, frames: Sequence[np.ndarray]) -> Image.Ima
     for row, (pictures, names) in enumerate(((upper, drawings.names), (lower, titles))):
         top = row * (size + _CAPTION + _GAP)
         for column, (picture, name) in enumerate(zip(pictures, names, strict=True)):
-            pen.text((column * size + 4, top + 2), name, _INK, font)
+            pen.text((column * size + 4, top + 2), cut_text(name, font, size - 6), _INK, font)
             sheet.paste(picture, (column * size, top + _CAPTION))
     middle = size + _CAPTION + _GAP // 2
     pen.line((0, middle, sheet.width, middle), fill=_RULE)

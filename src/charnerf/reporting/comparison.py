@@ -8,6 +8,7 @@ from charnerf.reporting.families import TABLE_TWO, Family, families
 from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, NONE, cell, seconds_text
 from charnerf.reporting.rows import Row
 from charnerf.reporting.runs import Unfinished
+from charnerf.wording import counted
 
 PAPER_KEYS = ("psnr", "ssim", "lpips")
 _LEFT_OUT = {"rays": "rays left out", "samples": "samples left out", "grid_cells": "grid cells left out"}
@@ -133,5 +134,9 @@ def _baselines(rows: Sequence[Row]) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 def _place(environment: Mapping[str, Any]) -> str:
-    parts = (environment.get("machine"), environment.get("device"), f"{environment.get('threads')} threads")
+    parts = (environment.get("machine"), environment.get("device"), _threads(environment.get("threads")))
     return ", ".join(str(part) for part in parts if part)
+
+
+def _threads(number: Any) -> str | None:
+    return counted(number, "thread") if isinstance(number, int) else None

@@ -21,6 +21,7 @@ from charnerf.reporting.run_report import verdict, write_run_report
 from charnerf.reporting.runs import Run, read_runs, read_unfinished
 from charnerf.reporting.significance import significance
 from charnerf.reporting.training_time import training_time
+from charnerf.wording import counted
 
 ATTENTION_ROWS = 4  # figures of view attention in one report, at most
 
@@ -71,7 +72,7 @@ def write_folder_report(
     if not runs:
         raise DataError(_nothing_finished(folder))
     rows = sorted_rows(group_rows(runs))
-    title = f"charnerf: {len(rows)} rows, {len(runs)} runs in {folder.resolve().name}"
+    title = f"charnerf: {counted(len(rows), 'row')}, {counted(len(runs), 'run')} in {folder.resolve().name}"
     blocks: list[Block] = [Heading(title, 1), Text(_lead(rows, runs), lead=True)]
     blocks += unfinished(read_unfinished(folder))
     blocks += comparison(rows)

@@ -2,22 +2,40 @@
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
+const narrow = matchMedia("(max-width: 600px)");
+
+/** Panels that stand side by side one below the other: on a phone their labels would overlap. */
+function stack(layout) {
+  const panels = Object.keys(layout).filter((name) => /^xaxis/.test(name)).map((name) => name.slice(5));
+  if (panels.length < 2) return;
+  panels.forEach((number, place) => {
+    const top = 1 - place / panels.length;
+    layout[`xaxis${number}`] = { ...layout[`xaxis${number}`], domain: [0, 1] };
+    layout[`yaxis${number}`] = { ...layout[`yaxis${number}`], domain: [top - 0.68 / panels.length, top] };
+  });
+  layout.height = 300 * panels.length;
+  layout.legend = { ...layout.legend, y: -0.22 / panels.length };
+}
+
 function drawPlots() {
   const style = getComputedStyle(document.documentElement);
   const color = (name) => style.getPropertyValue(name).trim();
-  const axis = { gridcolor: color("--rule"), linecolor: color("--strong") };
+  const axis = { gridcolor: color("--rule"), linecolor: color("--strong"), automargin: true };
   for (const figure of document.querySelectorAll("figure.plot")) {
     const plot = JSON.parse(figure.querySelector("script").textContent);
     const layout = { ...plot.layout, paper_bgcolor: color("--paper"), plot_bgcolor: color("--paper") };
     layout.font = { ...layout.font, color: color("--ink") };
     for (const key of Object.keys(layout).filter((name) => /^[xy]axis/.test(name))) layout[key] = { ...layout[key], ...axis };
+    const buttons = { bgcolor: color("--block"), bordercolor: color("--rule"), showactive: false }; // the axis says which
+    layout.updatemenus = layout.updatemenus?.map((menu) => ({ ...menu, ...buttons }));
+    if (narrow.matches) stack(layout);
     Plotly.react(figure.querySelector("div"), plot.data, layout, { responsive: true, displaylogo: false });
   }
 }
 
 if (document.querySelector("figure.plot")) {
   drawPlots();
-  dark.addEventListener("change", drawPlots);
+  for (const change of [dark, narrow]) change.addEventListener("change", drawPlots);
 }
 
 const viewer = document.getElementById("mesh-viewer");

@@ -27,6 +27,7 @@ from charnerf.reporting.blocks import (
 )
 from charnerf.viewer.element import mesh_element, viewer_script
 
+WIDE = 1.6  # width over height of a picture that is more than one
 MOST_MESH = 16 * 2**20  # bytes of a mesh that stands in a page itself
 
 
@@ -71,14 +72,19 @@ def _(block: Table) -> str:
     inner = f"<table{kind}><thead>{line(block.header, 'th')}</thead><tbody>{rows}</tbody></table>"
     # wide tables scroll inside, from the keyboard too
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="table: {_columns(block)}">{inner}</div>'
+        f'<div class="scroll" tabindex="0" role="group" aria-label="table: {_columns(block)}">{inner}</div>'
     )
 
 
 @_html.register
 def _(block: Picture) -> str:
     caption = html.escape(block.caption)
-    return _figure(f'<img alt="{caption}" src="{_embedded(block.path)}">', caption)
+    with open_picture(block.path) as picture:
+        width, height = picture.size
+    shown = f'<img alt="{caption}" width="{width}" height="{height}" src="{_embedded(block.path)}">'
+    if width > WIDE * height:  # on a phone it scrolls inside: shrunk, nobody could read it
+        shown = f'<div class="scroll wide" tabindex="0" role="group" aria-label="{caption}">{shown}</div>'
+    return _figure(shown, caption)
 
 
 @_html.register

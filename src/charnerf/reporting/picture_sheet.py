@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 
-from charnerf.pictures import bytes_on_white, open_picture, save_png, to_bytes
+from charnerf.pictures import bytes_on_white, cut_text, open_picture, save_png, to_bytes
 
 CELL = 128  # pixels
 _INK = (60, 60, 60)
@@ -46,7 +46,7 @@ def save_sheet(
         pen.multiline_text((_LABEL + column * (CELL + _GAP), 2), "\n".join(lines), _INK, font, spacing=2)
     for row, (label, pictures) in enumerate(rows):
         top = header + row * (CELL + _GAP)
-        lines = [_cut(line, font, _LABEL - 8) for line in label.splitlines()]
+        lines = [cut_text(line, font, _LABEL - 8) for line in label.splitlines()]
         pen.multiline_text((4, top + CELL // 2 - 7 * len(lines)), "\n".join(lines), _INK, font)
         for column, picture in enumerate(pictures):
             if picture is not None:
@@ -65,15 +65,5 @@ def _wrapped(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, widt
         if lines and font.getlength(longer) <= width:
             lines[-1] = longer
         else:
-            lines.append(_cut(word, font, width))
+            lines.append(cut_text(word, font, width))
     return lines or [""]
-
-
-def _cut(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: int) -> str:
-    """Text that fits into a width, its middle left out where it is longer."""
-    kept = len(text)
-    shown = text
-    while kept > 4 and font.getlength(shown) > width:
-        kept -= 1
-        shown = f"{text[: (kept + 1) // 2]}…{text[len(text) - kept // 2 :]}"
-    return shown

@@ -10,6 +10,7 @@ from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, metric_cel
 from charnerf.reporting.meshes import run_meshes
 from charnerf.reporting.plots import plot_angles, plot_training
 from charnerf.reporting.run_files import read_curve, read_metrics
+from charnerf.wording import counted
 
 MAX_SHEETS = 12
 
@@ -51,8 +52,8 @@ def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> P
 def verdict(metrics: Mapping[str, Any]) -> str:
     """What the run reached, and by how much it beats the better baseline."""
     start = (
-        f"{metrics['num_characters']} characters of the {metrics['split']} split, "
-        f"{metrics['num_views']} views: "
+        f"{counted(metrics['num_characters'], 'character')} of the {metrics['split']} split, "
+        f"{counted(metrics['num_views'], 'view')}: "
         f"{cell(metrics['psnr'], '{:.2f}')} dB PSNR, "
         f"{cell(metrics['psnr_foreground'], '{:.2f}')} dB on the foreground"
     )

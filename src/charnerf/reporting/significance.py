@@ -10,6 +10,7 @@ from charnerf.reporting.characters import scores_by_character
 from charnerf.reporting.families import families
 from charnerf.reporting.formats import NONE
 from charnerf.reporting.rows import Row
+from charnerf.wording import counted
 
 METRICS = {
     "psnr": ("PSNR", "{:.2f} dB"),
@@ -91,10 +92,11 @@ def _answer(question: Question) -> list[Block]:
     if not counts:
         return [heading, Text("The rows share no test character: nothing can be paired.")]
     blocks: list[Block] = [heading]
+    number = " or ".join(map(str, counts))
     method = (
-        f"Paired bootstrap over {' or '.join(map(str, counts))} test characters, {RESAMPLES:,} resamples, seeds averaged first; a"
-        " difference holds where p, corrected over the pairs by Holm, is below 0.05. Intervals are 95 %, of each pair alone."
-        " Resampling characters says nothing about training noise: for that, several seeds."
+        f"Paired bootstrap over {number} test {'character' if counts == [1] else 'characters'}, {RESAMPLES:,} resamples, seeds"
+        " averaged first; a difference holds where p, corrected over the pairs by Holm, is below 0.05. Intervals are 95 %, of"
+        " each pair alone. Resampling characters says nothing about training noise: for that, several seeds."
     )
     blocks.append(Text(method))
     smallest = max(map(len, pairs.values())) * 2.0 ** (1 - counts[-1])
@@ -123,9 +125,9 @@ def sentence(key: str, pairs: Sequence[Difference], order: Sequence[str]) -> str
             )
     open_ = sum(not one.holds for one in pairs)
     if not parts:
-        return f"{title}: no difference holds ({open_} pairs)."
+        return f"{title}: no difference holds ({counted(open_, 'pair')})."
     rest = (
-        f"; the other {open_} of {len(pairs)} pairs can not be told apart"
+        f"; the other {open_} of {counted(len(pairs), 'pair')} can not be told apart"
         if open_
         else "; that is every pair"
     )

@@ -5,6 +5,8 @@ import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from charnerf.wording import counted
+
 
 @dataclass(frozen=True)
 class CheckRow:
@@ -89,7 +91,7 @@ class CheckReport:
         ]
         lines.insert(1, "-" * len(lines[0]))
         broken = sum(not row.ok for row in self.rows)
-        lines.append(f"{len(self.rows)} rows, {broken} broken, {self.seconds:.1f} s")
+        lines.append(f"{counted(len(self.rows), 'row')}, {broken} broken, {self.seconds:.1f} s")
         return "\n".join(lines)
 
     def to_json(self, path: str | Path) -> None:

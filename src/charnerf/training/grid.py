@@ -6,6 +6,7 @@ from pathlib import Path
 from charnerf.errors import GridError
 from charnerf.reporting.folder_report import write_folder_report
 from charnerf.training.cells import DONE, cells_of
+from charnerf.wording import counted
 
 log = logging.getLogger(__name__)
 BEGUN_FILE = ".begun"
@@ -51,7 +52,7 @@ def check_grid(grid: Path, *, since: float = 0.0) -> None:
     raise GridError(
         "\n".join(
             [
-                f"{grid}: {len(left)} of {len(cells)} cells are not done, expected all of them; the same command"
+                f"{grid}: {len(left)} of {counted(len(cells), 'cell')} not done, expected all of them; the same command"
                 " goes on with them, error.txt in a cell's folder says more:",
                 *lines,
             ]
