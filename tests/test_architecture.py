@@ -50,6 +50,7 @@ ONLY_IN = {  # foreign package: where it may be imported
         "training/finish",
         "training/cells",
         "training/identity",
+        "training/search",
     ),
     "lightning": ("training", "data/datamodule"),
     "typer": ("cli",),

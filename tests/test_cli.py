@@ -18,7 +18,15 @@ from charnerf.inference.build import build_model
 from charnerf.inference.weights import save_config, save_weights
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = ("capture", "generate", "evaluate", "mesh", "reconstruct", "report")  # that Typer describes
+COMMANDS = (
+    "capture",
+    "generate",
+    "evaluate",
+    "mesh",
+    "reconstruct",
+    "report",
+    "search",
+)  # that Typer describes
 
 
 @pytest.fixture(scope="module")

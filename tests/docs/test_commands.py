@@ -1,8 +1,11 @@
 """Every command, key, option and path that README and docs print: run where that takes seconds, parsed or composed elsewhere."""
 
+import json
 import re
 import runpy
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -82,9 +85,6 @@ def test_a_training_composes(line: str, conf: Path, monkeypatch: pytest.MonkeyPa
     words = [
         word for word in shlex.split(line) if word not in ("python", "train.py", "charnerf", "train", "-m")
     ]
-    words = [
-        word for word in words if not word.startswith("hydra/launcher=") and "hydra.launcher" not in word
-    ]
     command_line.check_command_line(["-m", *words] if line in SWEEPS or " -m " in line else words, conf=conf)
 
 
@@ -109,6 +109,27 @@ def test_a_command_line_parses(line: str, monkeypatch: pytest.MonkeyPatch, tmp_p
             place.parent.mkdir(parents=True, exist_ok=True)
             place.touch() if missed[1].lower() == "file" else place.mkdir()
     raise AssertionError(line)
+
+
+MACHINES = [line for page, line in EVERY if page == "machines.md"]
+BRIEFLY = ["trainer=cpu", "scale.steps=2", "validation.times=1", "scale.eval_views=1", "data=folder"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", [line for line in MACHINES if re.search("joblib|_local|search", line)])
+def test_more_machines_work_as_typed(line: str, figure_dataset: Path, tmp_path: Path) -> None:
+    """At the smallest scale, for two steps."""
+    shorter = line.replace("scale=small budget.seconds=120", "").replace("--trials 40", "--trials 2")
+    words = [sys.executable if word == "python" else word for word in shlex.split(shorter)]
+    words = [str(ROOT / word) if word == "train.py" else word for word in words]
+    command = [*words, *BRIEFLY, "scale=smoke", f"data.root={figure_dataset}"]
+    if command[0] == "charnerf":
+        command = [sys.executable, "-m", *command]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (report,) = tmp_path.glob("outputs/**/report.md")
+    states = [json.loads(file.read_text())["state"] for file in report.parent.glob("*/cell.json")]
+    assert len(states) >= 2 and set(states) == {"done"}
 
 
 @pytest.fixture(scope="module")

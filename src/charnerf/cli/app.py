@@ -21,6 +21,7 @@ from charnerf.cli import (
     mesh,
     reconstruct,
     report,
+    search,
     train,
 )
 from charnerf.cli.messages import say
@@ -55,6 +56,7 @@ for module in (
     draw,
     bench,
     check,
+    search,
 ):
     app.command(module.__name__.rpartition(".")[2], epilog=DEBUG_NOTE)(module.command)
 

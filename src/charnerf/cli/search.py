@@ -1,0 +1,57 @@
+"""`charnerf search`: which configs give the least error for their seconds."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from charnerf.cli.messages import say
+from charnerf.cli.options import Folder
+
+Overrides = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="KEY=VALUE...",
+        help="As for train; what is searched has several values, range(1,5), interval(0.1,1.0) or tag(log,interval(1e-4,1e-2)).",
+    ),
+]
+
+
+def command(
+    overrides: Overrides,
+    output: Folder,
+    *,
+    trials: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Runs in all, those of before counted.")
+    ] = 20,
+    seconds: Annotated[
+        Literal["render_per_frame", "encode", "mesh", "train"], typer.Option(help="Which seconds count.")
+    ] = "render_per_frame",
+    seed: Annotated[int, typer.Option(min=0, help="What is chosen follows from it.")] = 0,
+) -> None:
+    """Train configs that Optuna chooses for the least error and seconds; DIR/front.csv has those that no other beats in both.
+
+    The same command goes on with what was interrupted; typed on other machines that share DIR, it works on the same search.
+    """
+    from charnerf.config.command_line import check_command_line
+    from charnerf.config.composition import compose_config
+    from charnerf.config.options import conf_folder
+    from charnerf.config.search_space import search_space
+    from charnerf.files import check_folder
+    from charnerf.process import keep_freed_memory, leave_disk_errors_to_callers, use_fastest_products
+    from charnerf.training.grid import begin_grid, check_grid, report_grid
+    from charnerf.training.search import Search
+
+    space = search_space(overrides, conf_folder())
+    for probe in space.probes():
+        check_command_line(probe, conf=conf_folder())
+    check_folder(output)
+    keep_freed_memory()
+    use_fastest_products()
+    leave_disk_errors_to_callers()
+    search = Search(output, space, seconds=seconds, seed=seed)
+    since = begin_grid(output)
+    search.run(trials, compose_config)
+    report: Path | None = report_grid(output)
+    say(f"front: {search.write_front()}{f'; report: {report}' if report else ''}")
+    check_grid(output, since=since)
