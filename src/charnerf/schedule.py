@@ -22,8 +22,8 @@ class Phase:
     """A stretch of training with fixed counts.
 
     Attributes:
-        rays: Rays a step, of all characters of the batch together.
-        surface_points: Surface points a step, of all characters together; 0 trains by rays alone.
+        rays: Rays a step and process, of all characters of its batch together.
+        surface_points: Surface points a step and process, of all its characters together; 0 trains by rays alone.
         until: Where it ends: one of {share: of the run}, {steps: count}, {seconds: of training}; None: never.
         loss_weights: Weights of loss terms that this phase sets otherwise than `loss` does, by term.
     """

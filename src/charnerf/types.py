@@ -266,7 +266,8 @@ class TrainBatch(MovableRecord):
             reads them.
         phase: Index of the schedule's phase.
         loss_weights: Weights that the phase overrides, by term.
-        step: Index of the batch, from 0; seeds everything random in it.
+        step: Index of the batch, from 0.
+        seeds: Of what is random about each of the B characters, here and in the renderer.
     """
 
     names: tuple[str, ...]
@@ -281,3 +282,4 @@ class TrainBatch(MovableRecord):
     phase: int
     loss_weights: Mapping[str, float]
     step: int
+    seeds: tuple[int, ...]

@@ -11,7 +11,7 @@ from charnerf.data.augmentation.recolor import Recolor, recolor
 from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.augmentation.stretch import Stretch, stretch
 from charnerf.data.mixed import MixedDataset
-from charnerf.data.sampler import BatchRequest
+from charnerf.data.sampler import BatchRequest, Share
 from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface
 from charnerf.geometry.cameras import project_into_all
@@ -40,7 +40,7 @@ def batch(figure_dataset):
     )
     dataset = MixedDataset(
         store=store, characters=1, foreground_share=0.75,
-        needs=Needs(depth=True, space_points=200), used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5,
+        needs=Needs(depth=True, space_points=200), used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5, share=Share(),
     )  # fmt: skip
     return dataset[BatchRequest(step=0, rays=64, surface_points=300, phase=0, loss_weights={})]
 

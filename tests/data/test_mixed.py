@@ -12,7 +12,7 @@ import torch
 
 from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.mixed import MixedDataset, stack_views
-from charnerf.data.sampler import BatchRequest
+from charnerf.data.sampler import BatchRequest, Share
 from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface
 from charnerf.data.validation import ValidationDataset, spread_frames
@@ -51,7 +51,7 @@ def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 
 def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
     settings = {
         "characters": 1, "foreground_share": 0.75, "needs": Needs(),
-        "used_views": Turnaround(), "augmentation": AugmentationSequence([]), "seed": 5,
+        "used_views": Turnaround(), "augmentation": AugmentationSequence([]), "seed": 5, "share": Share(),
     }  # fmt: skip
     return MixedDataset(store=store, **settings | changes)
 

@@ -46,6 +46,7 @@ def batch(**changes) -> TrainBatch:
         phase=0,
         loss_weights={},
         step=0,
+        seeds=(0,),
     )
     return replace(made, **changes)
 
@@ -85,7 +86,7 @@ def losses(**weights: float) -> WeightedLosses:
 
 
 def add_up(loss: WeightedLosses, passes: list[Pass], batch: TrainBatch) -> tuple[Tensor, dict[str, Tensor]]:
-    return loss(passes, batch, torch.Generator())
+    return loss(passes, batch, [torch.Generator()])
 
 
 BY_HAND = {

@@ -90,6 +90,7 @@ def batch_of(
         phase=0,
         loss_weights={},
         step=step,
+        seeds=(step,),
     )
     return batch if change is None else change(batch)
 

@@ -18,7 +18,7 @@ class Thin(AbstractTerm):
         self.weights = {"thin": weight}
         self.needs = Needs()
 
-    def query(self, batch, generator):
+    def query(self, batch, generators):
         origin = torch.zeros(len(batch.names), 1, 3)
         return Query(origin, origin)
 

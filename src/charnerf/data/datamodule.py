@@ -12,9 +12,9 @@ from torch.utils.data import DataLoader, Dataset
 
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
-from charnerf.data.sampler import BatchRequest, PhaseSampler
+from charnerf.data.sampler import BatchRequest, PhaseSampler, Share
 from charnerf.data.store import CharacterStore, SurfaceOf
-from charnerf.data.validation import ValidationDataset, ValidationView
+from charnerf.data.validation import ValidationDataset, ValidationView, shared_out
 from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.interruption import leave_signals_to_parent
 from charnerf.types import Hull, SourceViews, TrainBatch
@@ -35,7 +35,7 @@ class MixedDataModule(L.LightningDataModule):
         workers: Processes that make training batches ahead of the steps, the same batches as without; None: one where a
             GPU would wait for them, else none.
         surface_of: Makes a training character's surface.
-        make_dataset: Makes the training data set of a store.
+        make_dataset: Makes the training data set of a store, and of this process's share of every batch.
         sampler: Asks for batches.
 
     Raises:
@@ -54,7 +54,7 @@ class MixedDataModule(L.LightningDataModule):
         memory_mib: float,
         workers: int | None,
         surface_of: SurfaceOf,
-        make_dataset: Callable[[CharacterStore], MixedDataset],
+        make_dataset: Callable[[CharacterStore, Share], MixedDataset],
         sampler: PhaseSampler,
     ) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class MixedDataModule(L.LightningDataModule):
         on_gpu = self.trainer is not None and self.trainer.strategy.root_device.type == "cuda"
         workers = int(on_gpu and _can_fork()) if self.workers is None else self.workers
         return DataLoader(
-            _ErrorsAsItems(self.make_dataset(self.train_store)),
+            _ErrorsAsItems(self.make_dataset(self.train_store, self._share)),
             sampler=self.sampler,
             batch_size=None,
             collate_fn=_as_is,
@@ -92,9 +92,18 @@ class MixedDataModule(L.LightningDataModule):
         )
 
     def val_dataloader(self) -> DataLoader[ValidationView]:
-        """Pictures of the validation characters."""
+        """Pictures of the validation characters, every so many-th where processes share them."""
         dataset = ValidationDataset(store=self.val_store, views=self.val_views)
-        return DataLoader(dataset, batch_size=None, collate_fn=_as_is)
+        return DataLoader(
+            dataset, sampler=shared_out(len(dataset), self._share), batch_size=None, collate_fn=_as_is
+        )
+
+    @property
+    def _share(self) -> Share:
+        """This process's, of the trainer's."""
+        if self.trainer is None:
+            return Share()
+        return Share(self.trainer.global_rank, self.trainer.world_size)
 
     def transfer_batch_to_device(self, batch: Any, device: torch.device, dataloader_idx: int) -> Any:
         """Move a batch, beside the GPU's work where it is pinned; raise the error that there was instead of one."""

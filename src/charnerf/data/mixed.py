@@ -1,16 +1,16 @@
 """Training batches: target rays and surface points of a few characters, drawn from the step's own seed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import final
 
 import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from charnerf.data.sampler import BatchRequest, step_seed
+from charnerf.data.sampler import BatchRequest, Share, step_seed
 from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
-from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_rays
 from charnerf.losses.base import Needs
@@ -23,13 +23,14 @@ class MixedDataset(Dataset[TrainBatch]):
 
     Args:
         store: The characters.
-        characters: B, characters a step.
+        characters: B, characters a step and process.
         foreground_share: Share of the rays drawn from pixels that show the character, so that training does not collapse to white;
             the rest is drawn from pixels beside it whose rays may meet the hull.
         needs: What the loss reads of a batch besides rays.
         used_views: The model's rule from drawings to views; a hull has maps of all of those.
-        augmentation: Changes a batch at random.
+        augmentation: Changes a character's batch at random.
         seed: Of the run.
+        share: Of every step's batch, which this process makes.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class MixedDataset(Dataset[TrainBatch]):
         used_views: Callable[[SourceViews], SourceViews],
         augmentation: Callable[[TrainBatch, torch.Generator], TrainBatch],
         seed: int,
+        share: Share,
     ) -> None:
         self.store = store
         self.characters = min(characters, len(store))
@@ -50,45 +52,54 @@ class MixedDataset(Dataset[TrainBatch]):
         self.used_views = used_views
         self.augmentation = augmentation
         self.seed = seed
+        self.share = share
 
     def __getitem__(self, request: BatchRequest) -> TrainBatch:  # type: ignore[override]
-        """Make the batch of a request; the same request makes the same batch."""
-        generator = torch.Generator().manual_seed(step_seed(self.seed, request.step))
-        chosen = torch.randperm(len(self.store), generator=generator)[: self.characters]
-        opened = [self.store.open(self.store.names[int(index)]) for index in chosen]
-        rays = _count_each(request.rays, len(opened))
-        drawn = [self._rays(one, rays, generator) for one in opened]
-        points = _count_each(request.surface_points, len(opened))
-        surfaces = [one.surface for one in opened]
-        surface = _sample_surfaces(surfaces, points, generator) if points else None
-        space = self._space(opened, generator)
-        views = stack_views([one.character.sources for one in opened])
+        """Make this process's share of the batch of a request; the same request makes the same batch.
+
+        N processes make together what one makes that is asked for N times as many characters, rays and points: characters are
+        drawn for all of them, and what is random about one hangs on its place among those.
+        """
+        chosen = self._choose(request.step)
+        points = request.surface_points if all(map(self.store.has_mesh, chosen)) else 0  # or rays alone
+        first = self.share.process * self.characters
+        return stack_batches(
+            [
+                self._alone(chosen[place], step_seed(self.seed, request.step, place), request, points)
+                for place in range(first, first + self.characters)
+            ],
+            self.used_views,
+        )
+
+    def _choose(self, step: int) -> list[str]:
+        """Characters of a step, of all processes; the same one again only where there are too few."""
+        generator = torch.Generator().manual_seed(step_seed(self.seed, step))
+        wanted, there = self.characters * self.share.processes, len(self.store)
+        orders = [torch.randperm(there, generator=generator) for _ in range(-(-wanted // there))]
+        return [self.store.names[int(index)] for index in torch.cat(orders)[:wanted]]
+
+    def _alone(self, name: str, seed: int, request: BatchRequest, surface_points: int) -> TrainBatch:
+        """A batch of one character."""
+        generator = torch.Generator().manual_seed(seed)
+        one = self.store.open(name)
+        rays, rgb, alpha, depth = self._rays(one, _count_each(request.rays, self.characters), generator)
+        points = _count_each(surface_points, self.characters)
         batch = TrainBatch(
-            names=tuple(one.character.name for one in opened),
-            views=views,
-            hull=self._hulls(opened, views),
-            rays=RayBundle(
-                origins=torch.stack([d[0].origins for d in drawn]),
-                directions=torch.stack([d[0].directions for d in drawn]),
-            ),
-            rgb=torch.stack([d[1] for d in drawn]),
-            alpha=torch.stack([d[2] for d in drawn]),
-            depth=torch.stack([d[3] for d in drawn]) if self.needs.depth else None,
-            surface=surface,
-            space=space,
+            names=(name,),
+            views=one.character.sources,
+            hull=one.hull,
+            rays=rays[None],
+            rgb=rgb[None],
+            alpha=alpha[None],
+            depth=depth[None] if self.needs.depth else None,
+            surface=one.surface.sample(points, generator) if points and one.surface is not None else None,
+            space=self._space(one, generator),
             phase=request.phase,
             loss_weights=request.loss_weights,
             step=request.step,
+            seeds=(seed,),
         )
         return self.augmentation(batch, generator)
-
-    def _hulls(self, opened: list[OpenCharacter], views: SourceViews) -> Hull | None:
-        """Hulls of the batch, None for a model without."""
-        hulls = [one.hull for one in opened if one.hull is not None]
-        if not hulls or len(opened) == 1:
-            return hulls[0] if hulls else None
-        alone = [self.used_views(one.character.sources) for one in opened]
-        return stack_hulls(hulls, alone, self.used_views(views))
 
     def _rays(
         self, one: OpenCharacter, num_rays: int, generator: torch.Generator
@@ -126,21 +137,50 @@ class MixedDataset(Dataset[TrainBatch]):
         depths = one.character.depths(used.tolist()).flatten(1)
         return depths[inverse, rest] / (axis * rays.directions).sum(-1).clamp_min(1e-6)
 
-    def _space(self, opened: list[OpenCharacter], generator: torch.Generator) -> SpacePoints | None:
-        """Labelled points in the hulls, None where no loss reads them."""
+    def _space(self, one: OpenCharacter, generator: torch.Generator) -> SpacePoints | None:
+        """Labelled points in the hull, None where no loss reads them."""
         if self.needs.space_points == 0:
             return None
-        if any(one.hull is None for one in opened):
+        if one.hull is None:
             raise DataError(
                 "model.hull: found false, but a term of the loss reads labelled points, expected a hull to draw them in; set its "
                 "weight to 0 or model.hull=true."
             )
-        labelled = [
-            label_points(one, _count_each(self.needs.space_points, len(opened)), generator) for one in opened
-        ]
-        return SpacePoints(
-            points=torch.stack([p[0] for p in labelled]), inside=torch.stack([p[1] for p in labelled])
-        )
+        points, inside = label_points(one, _count_each(self.needs.space_points, self.characters), generator)
+        return SpacePoints(points=points[None], inside=inside[None])
+
+
+def stack_batches(
+    batches: Sequence[TrainBatch], used_views: Callable[[SourceViews], SourceViews]
+) -> TrainBatch:
+    """Batches of one character each as one batch.
+
+    Args:
+        batches: Of one step, with the same counts and the same data.
+        used_views: The model's rule from drawings to views; a hull has maps of all of those.
+    """
+    first = batches[0]
+    if len(batches) == 1:
+        return first
+    views = stack_views([batch.views for batch in batches])
+    hulls = [batch.hull for batch in batches if batch.hull is not None]
+    alone = [used_views(batch.views) for batch in batches]
+    depths = [batch.depth for batch in batches if batch.depth is not None]
+    surfaces = [batch.surface for batch in batches if batch.surface is not None]
+    spaces = [batch.space for batch in batches if batch.space is not None]
+    return replace(
+        first,
+        names=tuple(batch.names[0] for batch in batches),
+        views=views,
+        hull=stack_hulls(hulls, alone, used_views(views)) if hulls else None,
+        rays=RayBundle.joined([batch.rays for batch in batches]),
+        rgb=torch.cat([batch.rgb for batch in batches]),
+        alpha=torch.cat([batch.alpha for batch in batches]),
+        depth=torch.cat(depths) if depths else None,
+        surface=SurfacePoints.joined(surfaces) if surfaces else None,
+        space=SpacePoints.joined(spaces) if spaces else None,
+        seeds=tuple(batch.seeds[0] for batch in batches),
+    )
 
 
 def stack_views(views: list[SourceViews]) -> SourceViews:
@@ -177,18 +217,6 @@ def stack_views(views: list[SourceViews]) -> SourceViews:
 def _count_each(total: int, number: int) -> int:
     """How many each of a number of characters gives to a total, rounded up."""
     return -(-total // number)
-
-
-def _sample_surfaces(
-    surfaces: list[AbstractSurface | None], num_points: int, generator: torch.Generator
-) -> SurfacePoints | None:
-    """Points on every character's surface; None if one has no mesh (rays alone then)."""
-    if any(surface is None for surface in surfaces):
-        return None
-    samples = [surface.sample(num_points, generator) for surface in surfaces if surface is not None]
-    return SurfacePoints(
-        points=torch.cat([s.points for s in samples]), rgb=torch.cat([s.rgb for s in samples])
-    )
 
 
 def stack_hulls(hulls: list[Hull], alone: list[SourceViews], together: SourceViews) -> Hull:

@@ -33,8 +33,8 @@ class BatchRequest:
 
     Attributes:
         step: Index of the batch in the run; seeds everything random in it.
-        rays: Rays, of all characters together.
-        surface_points: Surface points, of all characters together.
+        rays: Rays a process, of all its characters together.
+        surface_points: Surface points a process, of all its characters together.
         phase: Index of the phase.
         loss_weights: Loss weights that the phase overrides.
     """
@@ -46,9 +46,27 @@ class BatchRequest:
     loss_weights: Mapping[str, float]
 
 
-def step_seed(seed: int, step: int) -> int:
-    """Seed of everything random in a step of a run, hashed to 32 bits: torch's CPU generator drops all bits above."""
-    return int(np.random.SeedSequence((seed, step)).generate_state(1)[0])
+@dataclass(frozen=True)
+class Share:
+    """Which part of every step's batch one of the processes of a training makes; alone it makes all of it.
+
+    Attributes:
+        process: Its number, from 0.
+        processes: How many there are.
+    """
+
+    process: int = 0
+    processes: int = 1
+
+
+def step_seed(seed: int, *place: int) -> int:
+    """Seed of what is random at a place in a run, hashed to 32 bits: torch's CPU generator drops all bits above.
+
+    Args:
+        seed: Of the run.
+        place: The step, and of what is random about one character its place in the step's batch.
+    """
+    return int(np.random.SeedSequence((seed, *place)).generate_state(1)[0])
 
 
 @final

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
+from charnerf.data.layout import MESH_FILE
 from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
 from charnerf.geometry.silhouettes import hull_silhouettes
@@ -89,6 +90,10 @@ class CharacterStore:
     def __len__(self) -> int:
         """Number of characters."""
         return len(self.names)
+
+    def has_mesh(self, name: str) -> bool:
+        """Whether a character has a mesh, without opening it."""
+        return (self.root / name / MESH_FILE).is_file()
 
     def open(self, name: str) -> OpenCharacter:
         """Return a character, from memory if it is there."""

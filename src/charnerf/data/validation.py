@@ -6,14 +6,16 @@ from typing import final
 from torch import Tensor
 from torch.utils.data import Dataset
 
+from charnerf.data.sampler import Share
 from charnerf.data.store import CharacterStore
 from charnerf.types import Cameras, Hull, SourceViews, TensorRecord
 
 
 @dataclass(frozen=True)
 class ValidationView(TensorRecord):
-    """One picture: drawings (B = 1), hull, camera of shape () and the true picture (H, W, 4)."""
+    """One picture: its place among all, drawings (B = 1), hull, camera of shape () and the true picture (H, W, 4)."""
 
+    index: int
     views: SourceViews
     hull: Hull | None
     camera: Cameras
@@ -43,11 +45,18 @@ class ValidationDataset(Dataset[ValidationView]):
         frames = spread_frames(len(one.images), self.views)
         frame = frames[index % self.views % len(frames)]
         return ValidationView(
+            index=index,
             views=one.character.sources,
             hull=one.hull,
             camera=one.character.cameras[frame],
             rgba=one.images[frame].float() / 255.0,
         )
+
+
+def shared_out(total: int, share: Share) -> list[int]:
+    """A process's part of all pictures; each gets as many, so the first are drawn again where they do not come out even."""
+    rounds = -(-total // share.processes)
+    return [(share.process + turn * share.processes) % total for turn in range(rounds)]
 
 
 def spread_frames(num_frames: int, wanted: int) -> list[int]:

@@ -1,7 +1,7 @@
 """What a term of the loss is: what it weighs, what it reads, and the points that it asks the field about."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -17,7 +17,7 @@ class Needs:
     Attributes:
         depth: Whether depth pictures are.
         surface: Whether points on the captured surface are.
-        space_points: Points in space labelled inside or outside, a step, of all characters together; 0 for none.
+        space_points: Points in space labelled inside or outside, a step and process, of all its characters together; 0 for none.
     """
 
     depth: bool = False
@@ -54,17 +54,20 @@ class AbstractTerm(ABC):
     needs: Needs
 
     @abstractmethod
-    def query(self, batch: TrainBatch, generator: torch.Generator) -> Query | None:
+    def query(self, batch: TrainBatch, generators: Sequence[torch.Generator]) -> Query | None:
         """Points that the field of each pass answers for this term; None where rays are all that it looks at.
 
         Args:
             batch: Of the step.
-            generator: Randomness of the step, on the CPU.
+            generators: Randomness of the step, of each character, on the CPU.
         """
 
     @abstractmethod
     def values(self, rays: RenderOutput, answer: FieldOutput | None, batch: TrainBatch) -> dict[str, Tensor]:
         """Unweighted values () of one pass, by name; those are left out whose data the batch lacks.
+
+        Gradients are averaged over the processes of a training, which have as many rays and points each: means over those need
+        nothing more. Who divides by another count divides by its `mean_over_processes`.
 
         Args:
             rays: Rendering of the batch's rays, (B, R).

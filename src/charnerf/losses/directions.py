@@ -19,7 +19,7 @@ class AbstractDirections(ABC):
         Args:
             points: (P, 3), m.
             origins: Of the training rays of the same character, (R, 3), m: where its cameras stand.
-            generator: Randomness of the step, on the CPU.
+            generator: Randomness of the step and character, on the CPU.
 
         Returns:
             (P, 3), unit, or zero for "no direction".

@@ -1,5 +1,6 @@
 """Points in space that the silhouettes label inside or outside."""
 
+from collections.abc import Sequence
 from typing import final
 
 import torch
@@ -32,7 +33,7 @@ class Occupancy(AbstractTerm):
         self.needs = Needs(space_points=num_points)
         self.delta = delta
 
-    def query(self, batch: TrainBatch, generator: torch.Generator) -> Query | None:
+    def query(self, batch: TrainBatch, generators: Sequence[torch.Generator]) -> Query | None:
         """The batch's labelled points, along no direction."""
         if batch.space is None:
             return None

@@ -1,5 +1,6 @@
 """Opacity of rays against the pictures' alpha."""
 
+from collections.abc import Sequence
 from typing import final
 
 import torch
@@ -22,7 +23,7 @@ class Opacity(AbstractTerm):
         self.weights = {"opacity": weight}
         self.needs = Needs()
 
-    def query(self, batch: TrainBatch, generator: torch.Generator) -> None:
+    def query(self, batch: TrainBatch, generators: Sequence[torch.Generator]) -> None:
         """None: it looks at rays."""
 
     def values(self, rays: RenderOutput, answer: FieldOutput | None, batch: TrainBatch) -> dict[str, Tensor]:

@@ -1,5 +1,6 @@
 """Colours of rays against the pictures'."""
 
+from collections.abc import Sequence
 from typing import final
 
 import torch
@@ -24,7 +25,7 @@ class Reconstruction(AbstractTerm):
         self.weights = {"reconstruction": weight}
         self.needs = Needs()
 
-    def query(self, batch: TrainBatch, generator: torch.Generator) -> None:
+    def query(self, batch: TrainBatch, generators: Sequence[torch.Generator]) -> None:
         """None: it looks at rays."""
 
     def values(self, rays: RenderOutput, answer: FieldOutput | None, batch: TrainBatch) -> dict[str, Tensor]:

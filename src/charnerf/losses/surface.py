@@ -1,5 +1,6 @@
 """Colour and alpha of points on the captured surface."""
 
+from collections.abc import Sequence
 from typing import final
 
 import torch
@@ -51,12 +52,12 @@ class Surface(AbstractTerm):
         self.directions = directions
         self.delta = 2.0 * box_half_extent / (num_coarse + num_fine) if delta is None else delta
 
-    def query(self, batch: TrainBatch, generator: torch.Generator) -> Query | None:
+    def query(self, batch: TrainBatch, generators: Sequence[torch.Generator]) -> Query | None:
         """The batch's surface points; None where a character has no mesh."""
         if batch.surface is None:
             return None
-        pairs = zip(batch.surface.points, batch.rays.origins, strict=True)
-        directions = [self.directions(points, origins, generator) for points, origins in pairs]
+        each = zip(batch.surface.points, batch.rays.origins, generators, strict=True)
+        directions = [self.directions(points, origins, generator) for points, origins, generator in each]
         return Query(batch.surface.points, torch.stack(directions))
 
     def values(self, rays: RenderOutput, answer: FieldOutput | None, batch: TrainBatch) -> dict[str, Tensor]:

@@ -1,6 +1,15 @@
-"""The loss terms as pure functions; each is a mean over rays or points."""
+"""The loss terms as pure functions; each is a mean over rays or points.
 
+Means are over those of this process; where it divides by a count of its own, that is the mean of the processes' counts, so
+that the mean of their errors is the error of all together.
+"""
+
+import torch
 from torch import Tensor
+
+from charnerf.distributed import mean_over_processes
+
+SOME = 1e-6  # below any mean of counts but 0, where what is divided is 0 too
 
 
 def squared_color_error(rgb: Tensor, target_rgb: Tensor) -> Tensor:
@@ -33,13 +42,12 @@ def absolute_depth_error(depth: Tensor, target_depth: Tensor, opacity: Tensor) -
     """
     meets = (target_depth > 0).to(depth.dtype)
     error = opacity.detach() * (depth - target_depth).abs()
-    return (error * meets).sum() / meets.sum().clamp_min(1.0)
+    return (error * meets).sum() / mean_over_processes(meets.sum()).clamp_min(SOME)
 
 
 def balanced_occupancy_error(alphas: Tensor, inside: Tensor) -> Tensor:
     """Mean squared difference of alpha and the label (...), inside and outside weighing the same (beyond the paper)."""
     error = (alphas - inside).square()
     outside = 1.0 - inside
-    within = (error * inside).sum() / inside.sum().clamp_min(1.0)
-    without = (error * outside).sum() / outside.sum().clamp_min(1.0)
-    return 0.5 * (within + without)
+    counts = mean_over_processes(torch.stack((inside.sum(), outside.sum()))).clamp_min(SOME)
+    return 0.5 * ((error * inside).sum() / counts[0] + (error * outside).sum() / counts[1])

@@ -83,21 +83,21 @@ class WeightedLosses:
         return needs
 
     def __call__(
-        self, passes: Sequence[Pass], batch: TrainBatch, generator: torch.Generator
+        self, passes: Sequence[Pass], batch: TrainBatch, generators: Sequence[torch.Generator]
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Total () and unweighted values (), each summed over the passes.
 
         Args:
             passes: The fine one, and the coarse one where there are two.
             batch: Of the step.
-            generator: Randomness of the step, on the CPU.
+            generators: Randomness of the step, of each character, on the CPU.
         """
         weights = self.active(batch.loss_weights)
         values: dict[str, Tensor] = {}
         for term in self.terms:
             if weights.keys().isdisjoint(term.weights):
                 continue
-            query = term.query(batch, generator)
+            query = term.query(batch, generators)
             for one in passes:
                 answer = None if query is None else one.answer(query)
                 for name, value in term.values(one.rays, answer, batch).items():

@@ -1,4 +1,7 @@
-"""Training time, evaluation excluded, and the share of the budget that is used up; survives a resume."""
+"""Training time, evaluation excluded, and the share of the budget that is used up; survives a resume.
+
+Time is read after each step, by the first of a training's processes: all of them decide by the same seconds.
+"""
 
 import time
 from typing import Any, final
@@ -22,26 +25,22 @@ class RunClock(L.Callback):
         self.budget_steps = steps
         self.budget_seconds = seconds
         self.steps = 0
-        self._done_seconds = 0.0
+        self.seconds = 0.0  # of training, until the end of the last step
         self._running_since: float | None = None
-
-    @property
-    def seconds(self) -> float:
-        """Training seconds until now."""
-        running = 0.0 if self._running_since is None else time.perf_counter() - self._running_since
-        return self._done_seconds + running
 
     def position(self, step: int | None = None) -> RunPosition:
         """Where the run stands, or, as far as steps tell, will stand once `step` of them are done."""
-        step, seconds = self.steps if step is None else step, self.seconds
+        step = self.steps if step is None else step
         progress = progress_of_run(
-            step=step, seconds=seconds, budget_steps=self.budget_steps, budget_seconds=self.budget_seconds
+            step=step,
+            seconds=self.seconds,
+            budget_steps=self.budget_steps,
+            budget_seconds=self.budget_seconds,
         )
-        return RunPosition(step=step, seconds=seconds, progress=progress)
+        return RunPosition(step=step, seconds=self.seconds, progress=progress)
 
     def pause(self) -> None:
         """Stop counting (evaluation, checkpoints)."""
-        self._done_seconds = self.seconds
         self._running_since = None
 
     def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
@@ -59,6 +58,10 @@ class RunClock(L.Callback):
 
     def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *_: Any) -> None:
         """Count the step; stop at the end of the budget."""
+        assert self._running_since is not None
+        now = time.perf_counter()
+        self.seconds = trainer.strategy.broadcast(self.seconds + now - self._running_since)
+        self._running_since = now
         self.steps += 1
         if self.position().progress >= 1.0:
             trainer.should_stop = True
@@ -82,5 +85,5 @@ class RunClock(L.Callback):
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Go on from a checkpoint."""
         self.steps = int(state_dict["steps"])
-        self._done_seconds = float(state_dict["seconds"])
+        self.seconds = float(state_dict["seconds"])
         self._running_since = None

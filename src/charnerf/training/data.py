@@ -10,7 +10,7 @@ from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.characters import Character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.mixed import MixedDataset
-from charnerf.data.sampler import PhaseSampler
+from charnerf.data.sampler import PhaseSampler, Share
 from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
 from charnerf.data.surface import AbstractSurface
 from charnerf.inference.build import build_part
@@ -28,7 +28,7 @@ def build_data(
     """The datamodule; what no loss needs is not opened."""
     splits, batches, validation = cfg.splits, cfg.batches, cfg.validation
 
-    def make_dataset(store: CharacterStore) -> MixedDataset:
+    def make_dataset(store: CharacterStore, share: Share) -> MixedDataset:
         return MixedDataset(
             store=store,
             characters=cfg.scale.batch_characters,
@@ -39,6 +39,7 @@ def build_data(
                 [build_part(one, {"used_views": model.views}) for one in cfg.augmentation.values()]
             ),
             seed=cfg.seed,
+            share=share,
         )
 
     return MixedDataModule(

@@ -7,7 +7,6 @@ from typing import Any, final
 
 import lightning as L
 import torch
-from torch import Tensor
 
 from charnerf.errors import NumericalError
 from charnerf.files import write_aside
@@ -40,10 +39,12 @@ class FiniteGuard(L.Callback):
         batch_idx: int,
     ) -> None:
         """Look at the loss of the step just done."""
-        loss = outputs["loss"] if isinstance(outputs, dict) else outputs
-        if isinstance(loss, Tensor) and bool(loss.isfinite().all()):
+        assert isinstance(pl_module, TrainingModule)
+        loss = float(pl_module.logged["train/loss/total"])  # of all processes, so that all end
+        if math.isfinite(loss):
             return
-        path = self.folder / f"nonfinite_batch_{batch.step:07d}.pt"
+        part = f"_{trainer.global_rank}" if trainer.world_size > 1 else ""
+        path = self.folder / f"nonfinite_batch_{batch.step:07d}{part}.pt"
         content = {"step": batch.step, "names": batch.names, "rgb": batch.rgb, "alpha": batch.alpha}
         with write_aside(path) as aside:
             torch.save(content, aside)

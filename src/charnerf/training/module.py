@@ -7,8 +7,9 @@ import lightning as L
 import torch
 from torch import Tensor
 
-from charnerf.data.sampler import Position, step_seed
+from charnerf.data.sampler import Position
 from charnerf.data.validation import ValidationView
+from charnerf.distributed import gathered, mean_over_processes
 from charnerf.evaluation.metrics import psnr, psnr_foreground, ssim
 from charnerf.losses.total import Pass, WeightedLosses
 from charnerf.models.charnerf import CharNeRF
@@ -17,6 +18,8 @@ from charnerf.scene import AbstractField
 from charnerf.training.optimization import OptimizerOf, optimizer_of, rate_at
 from charnerf.types import RenderOutput, TrainBatch
 from charnerf.volume.renderers.base import AbstractRenderer
+
+MEASURES = ("val/psnr", "val/ssim", "val/psnr_foreground")
 
 
 class TrainingModule(L.LightningModule):
@@ -30,7 +33,6 @@ class TrainingModule(L.LightningModule):
         optimizer: Makes the optimizer of parameters.
         final_rate: Learning rate at the end of the run over that at the start (cosine between them).
         position: Where the run stands.
-        seed: Of the run; with the step it seeds the jitter of the samples.
     """
 
     def __init__(
@@ -43,7 +45,6 @@ class TrainingModule(L.LightningModule):
         optimizer: OptimizerOf,
         final_rate: float,
         position: Position,
-        seed: int,
     ) -> None:
         super().__init__()
         self.model = model
@@ -53,28 +54,34 @@ class TrainingModule(L.LightningModule):
         self.make_optimizer = optimizer
         self.final_rate = final_rate
         self.position = position
-        self.seed = seed
-        self.logged: dict[str, Tensor | float] = {}  # by the last step
+        self.logged: dict[str, Tensor | float] = {}  # by the last step, of all processes
+        self._measured: list[tuple[float, ...]] = []  # in this validation, a row a picture: index, MEASURES
 
     def training_step(self, batch: TrainBatch, batch_idx: int) -> Tensor:
         """Loss of one batch."""
-        generator = torch.Generator().manual_seed(step_seed(self.seed, batch.step))
+        generators = [torch.Generator().manual_seed(seed) for seed in batch.seeds]
         encoded = self.model.encode(batch.views, batch.hull)
         scenes = [self.model.scene(encoded, index) for index in range(len(batch.names))]
-        renderings = [self.renderer.render(scene, batch.rays[b], generator) for b, scene in enumerate(scenes)]
+        renderings = [
+            self.renderer.render(scene, batch.rays[b], generators[b]) for b, scene in enumerate(scenes)
+        ]
         passes = [_pass([r.finest for r in renderings], [s.field for s in scenes])]
         if renderings[0].coarse is not None:
             coarse = [r.coarse for r in renderings if r.coarse is not None]
             passes.append(_pass(coarse, [s.coarse for s in scenes]))
-        loss, values = self.losses(passes, batch, generator)
-        self.logged = {f"train/loss/{name}": value.detach() for name, value in values.items()}
+        loss, values = self.losses(passes, batch, generators)
+        shown = batch.alpha > 0.5
+        seen = (passes[0].rays.opacity * shown).sum(), shown.sum()
+        counted = torch.stack([value.detach().float() for value in (*values.values(), loss, *seen)])
+        *means, opacity, count = mean_over_processes(counted)
+        points = 0 if batch.surface is None else batch.surface.points[..., 0].numel()
+        self.logged = {
+            f"train/loss/{name}": mean for name, mean in zip([*values, "total"], means, strict=True)
+        }
         self.logged |= {
-            "train/loss/total": loss.detach(),
-            "train/opacity_foreground": _seen_opacity(passes[0].rays.opacity.detach(), batch.alpha),
-            "train/rays": float(batch.alpha.numel()),
-            "train/surface_points": 0.0
-            if batch.surface is None
-            else float(batch.surface.points[..., 0].numel()),
+            "train/opacity_foreground": opacity / count,  # NaN if no ray shows the character
+            "train/rays": float(batch.alpha.numel() * self.trainer.world_size),
+            "train/surface_points": float(points * self.trainer.world_size),
             "train/phase": float(batch.phase),
             "train/seconds": self.position().seconds,
             "train/lr": float(self._param_groups()[0]["lr"]),
@@ -87,12 +94,18 @@ class TrainingModule(L.LightningModule):
         encoded = self.model.encode(view.views, view.hull)
         rendered = self.eval_renderer.render_camera(self.model.scene(encoded, 0), view.camera).finest
         rgb, target = rendered.rgb.float().clamp(0.0, 1.0), on_white(view.rgba)
-        measured = {"val/psnr": psnr(rgb, target), "val/ssim": ssim(rgb, target)}
         foreground = psnr_foreground(rgb, target, view.rgba[..., 3])
-        if foreground is not None:
-            measured["val/psnr_foreground"] = foreground
-        self.log_dict(measured, batch_size=1, sync_dist=True)
+        scores = psnr(rgb, target), ssim(rgb, target), math.nan if foreground is None else foreground
+        self._measured.append((view.index, *scores))
         return {"rendered": rendered}
+
+    def on_validation_epoch_end(self) -> None:
+        """Log the means over the pictures of all processes, each picture once and in its order."""
+        once = {index: scores for rows in gathered(self._measured) for index, *scores in rows}
+        self._measured = []
+        means = torch.tensor([once[index] for index in sorted(once)], dtype=torch.float64).nanmean(0).tolist()
+        known = {name: mean for name, mean in zip(MEASURES, means, strict=True) if not math.isnan(mean)}
+        self.log_dict(known, batch_size=1, sync_dist=True)
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
         """The optimizer; its rate is set before every step."""
@@ -120,9 +133,3 @@ def _pass(outputs: list[RenderOutput], fields: list[AbstractField]) -> Pass:
         depth=torch.stack([one.depth for one in outputs]),
     )
     return Pass(rays, fields)
-
-
-def _seen_opacity(opacity: Tensor, alpha: Tensor) -> float:
-    """Mean opacity of the rays that show the character; NaN if none does."""
-    shown = alpha > 0.5
-    return float(opacity[shown].mean()) if bool(shown.any()) else math.nan

@@ -24,7 +24,7 @@ class Drawing(AbstractAugmentation):
         scale: Largest relative difference in size of a view.
     """
 
-    num_draws = 0  # a step has no decision of its own: each character has one
+    num_draws = 0  # it decides by the generator
 
     def __init__(self, *, share: float, wobble: float, shift: float, scale: float) -> None:
         self.share = share

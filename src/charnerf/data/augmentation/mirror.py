@@ -16,7 +16,7 @@ class Mirror(AbstractAugmentation):
     """Left and right exchanged.
 
     Args:
-        share: Of the steps, in [0, 1].
+        share: Of the characters, in [0, 1].
     """
 
     num_draws = 1

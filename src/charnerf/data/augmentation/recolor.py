@@ -15,7 +15,7 @@ class Recolor(AbstractAugmentation):
     """Colour channels in another order.
 
     Args:
-        share: Of the steps, in [0, 1].
+        share: Of the characters, in [0, 1].
     """
 
     num_draws = 1

@@ -23,7 +23,7 @@ class Stretch(AbstractAugmentation):
     """Width and depth by random factors, where all source views are orthographic and look along an axis.
 
     Args:
-        share: Of the steps, in [0, 1].
+        share: Of the characters, in [0, 1].
         width_range: Factors on the width, smallest and largest; above 1.05 arms may leave the drawing's frame.
         depth_range: Factors on the depth.
         used_views: The model's rule from drawings to views; a hull has maps for all of those.
