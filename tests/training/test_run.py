@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -202,10 +203,14 @@ def test_the_rate_rises_then_falls_by_a_cosine():
 def test_the_clock_counts_training_only():
     clock = RunClock(steps=10, seconds=None)
     assert clock.position().progress == 0.0 and clock.seconds == 0.0
+    alone = SimpleNamespace(strategy=SimpleNamespace(broadcast=lambda seconds: seconds))
     clock.on_train_epoch_start(None, None)
-    clock.pause()
+    clock.on_train_batch_end(alone, None)
+    clock.on_validation_start(None, None)
     stopped = clock.seconds
-    assert 0 < stopped == clock.seconds
+    clock.on_train_epoch_start(None, None)
+    assert 0 < stopped == clock.seconds and clock.steps == 1
+    clock.steps = 0
     assert clock.position(step=7).progress == 0.7 and clock.position().step == 0
     other = RunClock(steps=None, seconds=2.0 * stopped)
     other.load_state_dict(clock.state_dict())

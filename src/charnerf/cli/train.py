@@ -121,8 +121,7 @@ def run_job(cfg: "DictConfig") -> None:
 
 
 def _run_job(cfg: "DictConfig") -> None:
-    keep_freed_memory()
-    use_fastest_products()
+    _begin_process()
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
 
@@ -135,8 +134,15 @@ def _run_job(cfg: "DictConfig") -> None:
     job = HydraConfig.get()
     validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
     folder = Path(job.runtime.output_dir)
-    leave_disk_errors_to_callers()
+    train = partial(run_training, begin_process=_begin_process)
     if job.mode is RunMode.MULTIRUN:
-        run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder)
+        run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder, train=train)
     else:
-        run_training(cfg, folder, accepted=partial(save_job, folder, cfg))
+        train(cfg, folder, accepted=partial(save_job, folder, cfg))
+
+
+def _begin_process() -> None:
+    """Set the process: this one, or one that a training on several devices begins."""
+    keep_freed_memory()
+    use_fastest_products()
+    leave_disk_errors_to_callers()

@@ -1,14 +1,17 @@
 """A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
-from charnerf.evaluation.character import MakeMesh, measure_character
+from charnerf.data.sampler import Share
+from charnerf.distributed import gathered
+from charnerf.evaluation.character import CharacterResult, MakeMesh, measure_character
 from charnerf.evaluation.frames import fixed_views
 from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.metrics_file import VIEWS_FILE, split_metrics, write_views
@@ -17,6 +20,8 @@ from charnerf.evaluation.pictures import save_pictures
 from charnerf.models.charnerf import CharNeRF
 from charnerf.progress import Progress
 from charnerf.volume.renderers.base import AbstractRenderer
+
+ALONE = Share()
 
 
 def as_captured(character: Character) -> Character:
@@ -37,6 +42,7 @@ def evaluate(
     training: TrainingCharacters | None = None,
     train_seconds: float | None = None,
     redrawn: Callable[[Character], Character] = as_captured,
+    share: Share = ALONE,
 ) -> dict[str, Any]:
     """Measure a model on a split; draws a bar with the time left, returns the content of metrics.json.
 
@@ -45,7 +51,7 @@ def evaluate(
         renderer: Draws its scenes.
         root: Folder of the data set.
         split: Which of its splits.
-        views: Fixed views a character, evenly chosen among its frames, or "all".
+        views: Fixed views a character, evenly chosen, or "all".
         output: Folder for every view's metrics, `views.csv`, and in `images/NAME/` the predictions (RGBA, named like the data
             set's pictures) and a contact sheet, `sheet.png`; None keeps none.
         mesh: As `measure_character` takes it; without it figures of surfaces are null.
@@ -53,24 +59,47 @@ def evaluate(
         training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
         redrawn: Gives a character other source views, such as `drawings.redrawn` does.
+        share: Which of the processes that measure the split together this is; each returns the numbers of all.
 
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
         NumericalError: If a prediction is not finite; the message names the picture.
     """
     lpips = Lpips()
-    measure = partial(measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training)
-    names = names_of(read_dataset(root), split)
-    results = []
+    measure = partial(
+        measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training, lpips=lpips
+    )
+    names = names_of(read_dataset(root), split)[share.process :: share.processes]
+    characters = (redrawn(load_character(root, name)) for name in names)
     with Progress(f"evaluate {split}") as progress:
-        for place, name in enumerate(names):
-            character = redrawn(load_character(root, name))
-            frames = fixed_views(character, views)
-            on_picture = progress.counter(len(frames), of=(place, len(names)))
-            result = measure(character, frames, lpips=lpips, on_picture=on_picture)
-            if output is not None:
-                save_pictures(output / "images" / name, character, frames, result.pictures)
-            results.append(replace(result, pictures={}))  # of one character at a time: they take memory
-    if output is not None:
+        results = _of_all(_measured(measure, characters, len(names), views, output, progress), share)
+    if output is not None and share.process == 0:
         write_views(output / VIEWS_FILE, results)
     return split_metrics(results, root, split, device=network.device, train_seconds=train_seconds)
+
+
+def _measured(
+    measure: Callable[..., CharacterResult],
+    characters: Iterable[Character],
+    number: int,
+    views: int | Literal["all"],
+    output: Path | None,
+    progress: Progress,
+) -> list[CharacterResult]:
+    """Measure characters one by one, and keep their pictures in files alone: they take memory."""
+    results = []
+    for place, character in enumerate(characters):
+        frames = fixed_views(character, views)
+        on_picture = progress.counter(len(frames), of=(place, number))
+        result = measure(character, frames, on_picture=on_picture)
+        if output is not None:
+            save_pictures(output / "images" / character.name, character, frames, result.pictures)
+        results.append(replace(result, pictures={}))
+    return results
+
+
+def _of_all(results: list[CharacterResult], share: Share) -> list[CharacterResult]:
+    """The results of all processes, in the order of the split."""
+    if share.processes == 1:
+        return results
+    return [one for turn in zip_longest(*gathered(results)) for one in turn if one is not None]

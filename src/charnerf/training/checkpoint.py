@@ -1,13 +1,13 @@
 """Checkpoints of a run: `last.ckpt`, the one before it, `previous.ckpt`, and the best; which one a run goes on from."""
 
 import logging
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NoReturn, final
 
 import lightning as L
+import torch
 from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import CheckpointIO
 
@@ -69,21 +69,23 @@ class LastCheckpoint(Checkpoint):
         """Write where one is due."""
         if trainer.fit_loop.epoch_loop.batch_progress.is_last_batch:
             return
-        stops = self._is_asked(trainer)
+        asked = self._asked(trainer)
         is_due = time.monotonic() - self._written >= self.every
-        if stops or trainer.strategy.broadcast(is_due):
+        if asked or trainer.strategy.broadcast(is_due):
             self._save(trainer)
-        if stops:
-            self._stop(trainer)
+        if asked:
+            self._stop(trainer, asked)
 
     def on_validation_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Write; end where that is asked for and the run is not over."""
         self._save(trainer)
-        if not trainer.should_stop and self._is_asked(trainer):
-            self._stop(trainer)
+        if not trainer.should_stop and (asked := self._asked(trainer)):
+            self._stop(trainer, asked)
 
-    def _is_asked(self, trainer: L.Trainer) -> bool:
-        return trainer.strategy.reduce_boolean_decision(requested() is not None, all=False)
+    def _asked(self, trainer: L.Trainer) -> int:
+        """Number of the signal that came to this process or another one of the training; 0 before."""
+        asked = torch.tensor(requested() or 0, device=trainer.strategy.root_device)
+        return int(trainer.strategy.reduce(asked, reduce_op="max"))
 
     def _save(self, trainer: L.Trainer) -> None:
         trainer.save_checkpoint(self.file)
@@ -91,7 +93,7 @@ class LastCheckpoint(Checkpoint):
         if trainer.is_global_zero:
             self.on_saved()
 
-    def _stop(self, trainer: L.Trainer) -> None:
+    def _stop(self, trainer: L.Trainer, signal: int) -> NoReturn:
         log.warning(
             "Stopped after step %d; the checkpoint is %s. The same command goes on, a single run's with hydra.run.dir=%s"
             " ckpt_path=last",
@@ -99,7 +101,7 @@ class LastCheckpoint(Checkpoint):
             self.file,
             self.file.parent.parent,
         )
-        raise Stopped(requested() or signal.SIGTERM)  # SIGTERM: another rank was asked
+        raise Stopped(signal)
 
 
 def find_checkpoint(ckpt_path: str | None, folder: Path) -> Path | None:

@@ -1,7 +1,9 @@
 """What follows training: test figures, a mesh, the report."""
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import lightning as L
 import numpy as np
@@ -11,6 +13,7 @@ from omegaconf import DictConfig
 
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
+from charnerf.data.sampler import Share
 from charnerf.errors import NumericalError
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
@@ -41,7 +44,7 @@ def finish_run(
     threads: ThreadTuner,
     trainer: L.Trainer,
 ) -> None:
-    """Evaluate the test split, write metrics.json, meshes/ and the report.
+    """Evaluate the test split, shared out among the processes of a training, write metrics.json, meshes/ and the report.
 
     Args:
         cfg: Of the run.
@@ -67,13 +70,20 @@ def finish_run(
         mesh=make_mesh,
         training=TrainingCharacters([(root, split) for split in cfg.splits.train]),
         train_seconds=train_seconds,
+        share=Share(trainer.global_rank, trainer.world_size),
     )
+    if not trainer.is_global_zero:
+        return
     metrics["environment"]["training_steps_by_threads"] = dict(threads.steps_by_threads)
     size = sum(parameter.numel() for parameter in model.parameters())
     write_metrics(folder / "metrics.json", {**metrics, "num_parameters": size, "steps": trainer.global_step})
     first = names_of(read_dataset(root), cfg.splits.test)[0]
     write_first_mesh(folder, root, first, model, trainer)
-    report = write_run_report(folder)
+    _tell(metrics, write_run_report(folder))
+
+
+def _tell(metrics: Mapping[str, Any], report: Path) -> None:
+    """Log the figures that matter most."""
     beside = metrics["baselines"]["visual_hull"]
     log.info(
         "Test: %.2f dB, %.2f dB on the foreground, SSIM %.3f (visual hull: %.2f, %.2f, %.3f). Report: %s",

@@ -81,8 +81,7 @@ class BudgetBar(L.Callback):
         self, trainer: L.Trainer, pl_module: L.LightningModule, exception: BaseException
     ) -> None:
         """End its line, so that the message begins one."""
-        if self.bar is not None:
-            self.bar.close()
+        self.teardown(trainer, pl_module, "fit")
 
 
 @final
@@ -154,11 +153,11 @@ class PictureLogger(L.Callback):
         dataloader_idx: int = 0,
     ) -> None:
         """Draw the first view of each of the first characters, as it was measured."""
-        number, view = divmod(batch_idx, trainer.datamodule.val_views)  # type: ignore[attr-defined]
+        number, view = divmod(batch.index, trainer.datamodule.val_views)  # type: ignore[attr-defined]
         board = pl_module.logger
         if (
             trainer.sanity_checking
-            or view > 0
+            or view >= trainer.world_size  # not the first of the character's that this process draws
             or number >= PICTURES
             or not isinstance(board, TensorBoardLogger)
         ):

@@ -4,6 +4,8 @@ import logging
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import lightning as L
@@ -11,6 +13,7 @@ from omegaconf import DictConfig
 
 from charnerf.data.base import AbstractData
 from charnerf.data.datamodule import MixedDataModule
+from charnerf.data.sampler import Share
 from charnerf.files import named_full_disk, write_text
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.inference.weights import save_config, save_weights
@@ -24,6 +27,7 @@ from charnerf.training.data import build_data
 from charnerf.training.finish import finish_run
 from charnerf.training.identity import RunIdentity, WrittenRun, data_of, written_run
 from charnerf.training.module import TrainingModule
+from charnerf.training.processes import processes_to_begin, run_processes
 from charnerf.training.start import begin
 from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
 from charnerf.training.trainer import build_trainer, log_hyperparameters
@@ -33,17 +37,68 @@ log = logging.getLogger(__name__)
 START_FILE = "start.txt"  # where the weights of a run began, if that was not random
 
 
-@restored_threads()
-def run_training(cfg: DictConfig, folder: Path, *, accepted: Callable[[], object] = lambda: None) -> None:
+@dataclass(frozen=True)
+class _Prepared:
+    """A run that has been checked; what it reads is there.
+
+    Attributes:
+        cfg: Its config.
+        folder: Its folder.
+        root: The data set's.
+        checkpoint: From which it goes on; None where it begins.
+        identity: What its checkpoints say of it.
+    """
+
+    cfg: DictConfig
+    folder: Path
+    root: Path
+    checkpoint: Path | None
+    identity: RunIdentity
+
+
+@dataclass(frozen=True)
+class _Network:
+    """The model before it is trained, and where its weights began if that was not random."""
+
+    model: CharNeRF
+    start: str | None
+
+
+def run_training(
+    cfg: DictConfig,
+    folder: Path,
+    *,
+    accepted: Callable[[], object] = lambda: None,
+    begin_process: Callable[[], object] = lambda: None,
+) -> None:
     """Train, evaluate and report into a run folder.
 
     Args:
         cfg: Composed and validated.
         folder: The run folder (design: On disk); made if it is missing.
         accepted: Called before training, once nothing in the folder speaks against it.
+        begin_process: Sets each process that a training on several devices begins, as the caller's own is set; a function of a
+            module.
     """
-    logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)  # the bar and the report say the rest
-    L.seed_everything(cfg.seed, verbose=False)
+    prepared, network = _prepare(cfg, folder)
+    accepted()
+    count = processes_to_begin(cfg)
+    if count == 1:
+        _train(prepared, network)
+        return
+    log.info("Trains in %d processes; rays, points and characters a step are of each.", count)
+    with held():  # they have a checkpoint to write
+        run_processes(partial(_train_in, begin_process, prepared), count)
+
+
+def _train_in(begin_process: Callable[[], object], prepared: _Prepared, share: Share) -> None:
+    """Train as one process of several."""
+    begin_process()
+    _train(prepared, _begin(prepared.cfg, prepared.checkpoint))
+
+
+def _prepare(cfg: DictConfig, folder: Path) -> tuple[_Prepared, _Network]:
+    """Check everything that can be checked before the work, and make the data set."""
     source: AbstractData = build_part(cfg.data)
     source.check_image_size(cfg.scale.image_size)
     source.check_splits(**cfg.splits)
@@ -52,38 +107,51 @@ def run_training(cfg: DictConfig, folder: Path, *, accepted: Callable[[], object
     before = None if checkpoint is None else written_run(checkpoint)
     if before is not None:
         before.check_config(cfg)
-    losses, needs = build_losses(cfg)
-    model = build_model(cfg)
-    start = begin(model, cfg) if checkpoint is None else None
+    _, needs = build_losses(cfg)
+    network = _begin(cfg, checkpoint)
     root = source.prepare(depth=needs.depth)
-    identity = _identity(cfg, folder, root, before)
-    accepted()
+    return _Prepared(cfg, folder, root, checkpoint, _identity(cfg, folder, root, before)), network
+
+
+def _begin(cfg: DictConfig, checkpoint: Path | None) -> _Network:
+    """Build the model; the same each time."""
+    for name in ("lightning.pytorch", "lightning.fabric"):  # the bar and the report say the rest
+        logging.getLogger(name).setLevel(logging.WARNING)
+    L.seed_everything(cfg.seed, verbose=False)
+    model = build_model(cfg)
+    return _Network(model, begin(model, cfg) if checkpoint is None else None)
+
+
+@restored_threads()
+def _train(prepared: _Prepared, network: _Network) -> None:
+    """Train, evaluate and report; in each of the processes where there are several."""
+    cfg, folder, root, model = prepared.cfg, prepared.folder, prepared.root, network.model
+    losses, needs = build_losses(cfg)
     clock = RunClock(steps=cfg.budget.steps, seconds=cfg.budget.seconds)
     renderer = build_renderer(cfg)
     module = build_module(cfg, model, renderer, losses, clock)
     data = build_data(cfg, root, model, clock, needs)
     threads = ThreadTuner(adapts=may_choose(budget_seconds=cfg.budget.seconds))
     with held(), named_full_disk(folder):  # until a checkpoint, or the weights, are whole
-        trainer = build_trainer(cfg, folder, clock, losses.names, threads, identity)
+        trainer = build_trainer(cfg, folder, clock, losses.names, threads, prepared.identity)
         if trainer.is_global_zero:
             log_hyperparameters(trainer, cfg, model)
-            _note_start(folder, start)
-        _fit(trainer, module, data, checkpoint)
+            _note_start(folder, network.start)
+        _fit(trainer, module, data, prepared.checkpoint)
         if trainer.is_global_zero:
             save_weights(folder / "weights.safetensors", model, cfg)
             save_config(folder, cfg)
-    if trainer.is_global_zero:
-        with _trained(folder), named_full_disk(folder):
-            finish_run(
-                cfg,
-                folder,
-                root,
-                model.eval(),
-                renderer,
-                train_seconds=clock.seconds,
-                threads=threads,
-                trainer=trainer,
-            )
+    with _trained(folder), named_full_disk(folder):
+        finish_run(
+            cfg,
+            folder,
+            root,
+            model.eval(),
+            renderer,
+            train_seconds=clock.seconds,
+            threads=threads,
+            trainer=trainer,
+        )
 
 
 def _identity(cfg: DictConfig, folder: Path, root: Path, before: WrittenRun | None) -> RunIdentity:
@@ -146,7 +214,6 @@ def build_module(
         optimizer=build_part(cfg.optimizer),
         final_rate=cfg.optimization.final_lr_scale,
         position=clock.position,
-        seed=cfg.seed,
     )
 
 

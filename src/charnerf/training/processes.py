@@ -1,0 +1,215 @@
+"""The processes that a training takes on one machine, such as one a GPU.
+
+The command's own process trains nothing then: it has checked and prepared everything, hands the others their work, passes
+signals and logs on, and ends all when one has failed. Without this, Lightning would start the whole command again for each.
+"""
+
+import logging
+import multiprocessing
+import os
+import signal
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from logging.handlers import QueueHandler, QueueListener
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from multiprocessing.queues import Queue
+
+import lightning as L
+from lightning.fabric.plugins.environments.lightning import find_free_network_port
+from omegaconf import DictConfig
+
+from charnerf.data.sampler import Share
+from charnerf.errors import CharNeRFError, ConfigError
+from charnerf.inference.build import build_part
+from charnerf.interruption import SIGNALS, Stopped, end_with_parent, listening, requested
+from charnerf.progress import reported_to
+
+TICK = 0.5  # seconds between two looks at whether a signal has come
+PATIENCE = 10.0  # seconds for the others to end by themselves when one has failed
+QUIET = {"logger": False, "enable_checkpointing": False, "enable_progress_bar": False}
+BEGIN_OTHERWISE = ("spawn", "fork", "notebook")  # parts of the names of Lightning's strategies
+
+
+def processes_to_begin(cfg: DictConfig) -> int:
+    """How many processes `trainer` asks for that nobody has begun yet; 1 where this one is enough.
+
+    Raises:
+        ConfigError: If they are to be on several machines, or to begin in other ways.
+    """
+    trainer: L.Trainer = build_part(cfg.trainer, {**QUIET, "enable_model_summary": False})
+    environment = getattr(trainer.strategy, "cluster_environment", None)
+    if trainer.world_size == 1 or environment is None or environment.creates_processes_externally:
+        return 1
+    if trainer.num_nodes > 1:
+        raise ConfigError(
+            f"trainer.num_nodes: found {trainer.num_nodes}, but this process was started alone, expected 1; start one process a"
+            " device by srun or torchrun."
+        )
+    if any(part in str(cfg.trainer.get("strategy")) for part in BEGIN_OTHERWISE):
+        raise ConfigError(f"trainer.strategy: found {cfg.trainer.strategy}, expected ddp.")
+    return trainer.num_devices
+
+
+@dataclass(frozen=True)
+class _Report:
+    """Why a process has ended before its work, and when."""
+
+    time: float
+    error: BaseException
+
+
+@dataclass(frozen=True)
+class _Member:
+    """One of the processes, and where its report comes from."""
+
+    process: SpawnProcess
+    reports: Connection
+
+    def report(self) -> _Report | None:
+        """Of one that has ended."""
+        try:
+            return self.reports.recv() if self.reports.poll() else None
+        except EOFError:
+            return None
+
+
+def run_processes(work: Callable[[Share], None], count: int) -> None:
+    """Do work in processes that find one another by torch's distributed package, and wait until all have ended.
+
+    Args:
+        work: Gets the process's number. It can be pickled.
+        count: How many processes.
+
+    Raises:
+        Stopped: If a signal came, to this process or to one of them.
+        CharNeRFError: If a process was killed.
+        Exception: The first that one of them raised.
+    """
+    context = multiprocessing.get_context("spawn")
+    records: Queue[logging.LogRecord] = context.Queue()
+    listener = QueueListener(records, _HereLogged())
+    members: list[_Member] = []
+    port = find_free_network_port()
+    listener.start()
+    try:
+        for number in range(count):
+            here, there = context.Pipe(duplex=False)
+            place = (Share(number, count), port)
+            process = context.Process(target=_work, args=(work, *place, records, there))
+            with _signals_later():  # until the process has its own answer to them
+                process.start()
+            there.close()
+            members.append(_Member(process, here))
+        _await(members)
+        _raise_first(members)
+    finally:
+        for member in members:
+            member.process.kill()
+            member.process.join()
+        listener.stop()
+        records.close()
+
+
+def _await(members: Sequence[_Member]) -> None:
+    """Wait until all have ended; a signal is passed on, and where one has failed the others are given some time."""
+    passed, end = None, None
+    while running := [member.process for member in members if member.process.is_alive()]:
+        wait([process.sentinel for process in running], TICK)
+        if requested() is not None and passed is None:
+            passed = requested()
+            for process in running:
+                os.kill(process.pid or 0, passed or signal.SIGTERM)
+        failed = [one for one in members if one.process.exitcode not in (None, 0)]
+        if failed and end is None:
+            end = time.monotonic() + PATIENCE
+        if end is not None and time.monotonic() > end:
+            return
+
+
+def _raise_first(members: Sequence[_Member]) -> None:
+    """Raise what ended them: a kill that nobody asked for, or the first error."""
+    reports = [report for member in members if (report := member.report()) is not None]
+    for number, member in enumerate(members):
+        code = member.process.exitcode or 0
+        if code < 0 and requested() is None:
+            raise CharNeRFError(
+                f"process {number} of {len(members)} was ended by {signal.Signals(-code).name}, expected all to live; was there"
+                " memory enough? The same command goes on, a single run's with its hydra.run.dir and ckpt_path=last."
+            )
+    for report in sorted(reports, key=lambda report: report.time):
+        raise report.error
+
+
+@contextmanager
+def _signals_later() -> Iterator[None]:
+    """Let signals wait meanwhile; a process that is begun here inherits it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _work(
+    work: Callable[[Share], None],
+    share: Share,
+    port: int,
+    records: "Queue[logging.LogRecord]",
+    reports: Connection,
+) -> None:
+    """What one of the processes does."""
+    parent = multiprocessing.parent_process()
+    if parent is None or os.getppid() != parent.pid:
+        return  # it was killed meanwhile
+    end_with_parent()
+    os.environ |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port), "LOCAL_RANK": str(share.process)}
+    root = logging.getLogger()
+    root.setLevel(logging.INFO)
+    root.addHandler(QueueHandler(records))
+    quiet = nullcontext() if share.process == 0 else reported_to(lambda moment: None)
+    if share.process > 0:  # the first one speaks for all
+        logging.disable(logging.WARNING)
+        warnings.simplefilter("ignore")
+    failure: BaseException | None = None
+    try:
+        with listening(in_worker=True), quiet:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+            work(share)
+    except BaseException as error:
+        failure = error
+    if failure is None:
+        return
+    reports.send(_Report(time.monotonic(), _portable(failure)))
+    records.close()
+    records.join_thread()
+    os._exit(1)  # an ordinary end would wait for workers, and for processes that have failed
+
+
+def _portable(error: BaseException) -> BaseException:
+    """An error as another process can raise it; its trace is a note."""
+    try:
+        restored = multiprocessing.reduction.ForkingPickler.loads(
+            multiprocessing.reduction.ForkingPickler.dumps(error)
+        )
+        portable = error if isinstance(restored, type(error)) else None
+    except Exception:  # whatever an error's class does when it is pickled
+        portable = None
+    portable = portable or RuntimeError(f"{type(error).__name__}: {error}")
+    if not isinstance(error, Stopped):
+        portable.add_note("".join(traceback.format_exception(error)))
+    return portable
+
+
+class _HereLogged(logging.Handler):
+    """Logs records of other processes as if they were of this one."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hand a record to the handlers here."""
+        logger = logging.getLogger(record.name)
+        if logger.isEnabledFor(record.levelno):
+            logger.handle(record)
