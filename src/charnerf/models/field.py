@@ -85,9 +85,12 @@ class Field(nn.Module):
 
     def colors(self, trunk: TrunkOutput, views: PointViews, view_dirs: Tensor) -> Tensor:
         """Colours (P, 3)."""
+        return self.head.rgb_of(self.appearance(trunk, views, view_dirs), views.rgb)
+
+    def appearance(self, trunk: TrunkOutput, views: PointViews, view_dirs: Tensor) -> Tensor:
+        """What the head makes colours of, (P, C)."""
         features = self.density.color_features(trunk, views, view_dirs, self.combinator)
-        rgb: Tensor = self.head(features, trunk.view_features, views, view_dirs)
-        return rgb
+        return self.head.appearance(features, trunk.view_features, views, view_dirs)
 
     def hoist(self, rows: Tensor) -> Tensor:
         """Apply the linear layer of the features to the maps' rows (N, F) -> (N, D), once instead of at every point.

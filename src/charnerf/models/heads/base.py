@@ -8,13 +8,19 @@ from charnerf.models.inputs import PointViews
 
 
 class AbstractHead(nn.Module, ABC):
-    """Colour head: the last part of f2."""
+    """Colour head: the last part of f2, in two steps."""
 
-    @abstractmethod
     def forward(
         self, features: Tensor, view_features: Tensor, views: PointViews, view_dirs: Tensor
     ) -> Tensor:
-        """Colours of points.
+        """Colours of points, (P, 3), in [0, 1]; arguments as of `appearance`."""
+        return self.rgb_of(self.appearance(features, view_features, views, view_dirs), views.rgb)
+
+    @abstractmethod
+    def appearance(
+        self, features: Tensor, view_features: Tensor, views: PointViews, view_dirs: Tensor
+    ) -> Tensor:
+        """What the network says of colours of points.
 
         Args:
             features: Output of the multi-view blocks, (P, D).
@@ -23,5 +29,10 @@ class AbstractHead(nn.Module, ABC):
             view_dirs: (P, 3).
 
         Returns:
-            rgb, (P, 3), in [0, 1].
+            (P, C).
         """
+
+    @staticmethod
+    @abstractmethod
+    def rgb_of(appearance: Tensor, drawn: Tensor) -> Tensor:
+        """Colours (P, 3), in [0, 1], of that (P, C) and of the drawings' own colours there (P, V, 3); no weight takes part."""

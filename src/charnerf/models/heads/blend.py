@@ -31,10 +31,10 @@ class BlendHead(AbstractHead):
         with torch.no_grad():
             self.free.bias[3] = -2.0  # the gate starts nearly closed: colours come from the drawings
 
-    def forward(
+    def appearance(
         self, features: Tensor, view_features: Tensor, views: PointViews, view_dirs: Tensor
     ) -> Tensor:
-        """Colours (P, 3)."""
+        """Scores of the views, then the free colour and the gate before their sigmoids, (P, V + 4)."""
         visibility = views.visibility
         cosines = (view_dirs[:, None] * views.dirs).sum(-1, keepdim=True)
         readings = torch.cat((cosines, visibility[..., None], views.rgb), dim=-1)
@@ -48,7 +48,11 @@ class BlendHead(AbstractHead):
             self.score.bias,
         )
         logits = scores.view(views.valid.shape) + 2.0 * visibility
-        weights = torch.softmax(masked_logits(logits, views.valid), dim=-1)
-        blended = (weights[..., None] * views.rgb).sum(1)
-        free = self.free(F.relu(features))
+        return torch.cat((masked_logits(logits, views.valid), self.free(F.relu(features))), dim=-1)
+
+    @staticmethod
+    def rgb_of(appearance: Tensor, drawn: Tensor) -> Tensor:
+        """The drawings' colours by the softmax of their scores, and the free one by its gate."""
+        logits, free = appearance[:, :-4], appearance[:, -4:]
+        blended = (torch.softmax(logits, dim=-1)[..., None] * drawn).sum(1)
         return blended + torch.sigmoid(free[:, 3:]) * (torch.sigmoid(free[:, :3]) - blended)

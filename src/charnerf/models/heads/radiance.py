@@ -22,8 +22,14 @@ class RadianceHead(AbstractHead):
         super().__init__()
         self.rgb = nn.Linear(width, 3)
 
-    def forward(
+    def appearance(
         self, features: Tensor, view_features: Tensor, views: PointViews, view_dirs: Tensor
     ) -> Tensor:
-        """Colours (P, 3) from features (P, D)."""
-        return torch.sigmoid(self.rgb(F.relu(features)))
+        """Colours before the sigmoid, (P, 3), from features (P, D)."""
+        raw: Tensor = self.rgb(F.relu(features))
+        return raw
+
+    @staticmethod
+    def rgb_of(appearance: Tensor, drawn: Tensor) -> Tensor:
+        """Their sigmoid."""
+        return torch.sigmoid(appearance)
