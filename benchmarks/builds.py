@@ -13,7 +13,7 @@ from benchmarks.untrained import network_of, parameters_of
 from charnerf.bench.rendering import measure
 from charnerf.bench.subjects import Pictured, subject
 from charnerf.bench.timing import in_turns
-from charnerf.bench.workbench import ADAPTIVE, BASELINE, CULLED, settings_of
+from charnerf.bench.workbench import ADAPTIVE, BASELINE, CULLED
 from charnerf.inference.build import build_renderer
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -69,7 +69,7 @@ def large_network(pictured: Pictured, *, repeats: int) -> dict[str, Any]:
     """
     has_resnet = find_spec("transformers") is not None
     network, cfg = network_of(PIXELNERF if has_resnet else PIXELNERF + WITHOUT_RESNET)
-    like = settings_of(build_renderer(cfg))
+    like = build_renderer(cfg).settings
     fewer = {**like, **{name: like[name] // FEWER for name in ("num_coarse", "num_fine")}}
     one = subject(pictured, network, num_pixels=NUM_RAYS)
     renderers: dict[str, AbstractRenderer] = {

@@ -32,7 +32,7 @@ from charnerf.bench.rendering import measure
 from charnerf.bench.subjects import NUM_PIXELS, subject
 from charnerf.bench.sweep import Method, sample_methods, sweep
 from charnerf.bench.timing import in_turns
-from charnerf.bench.workbench import ADAPTIVE, CULLED, DENSE, Workbench, settings_of
+from charnerf.bench.workbench import ADAPTIVE, CULLED, DENSE, Workbench
 from charnerf.geometry.resizing import resized_views
 from charnerf.inference.build import build_renderer
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -131,7 +131,7 @@ def _arithmetic(setting: Setting) -> list[dict[str, Any]]:
 def _losses(setting: Setting) -> list[dict[str, Any]]:
     """Losses of training one character from seeded weights: culled, dense and as the baseline."""
     network, cfg = network_of(("scale=small",))
-    like = {**settings_of(build_renderer(cfg)), "num_coarse": int(cfg.scale.train_num_coarse)}
+    like = {**build_renderer(cfg).settings, "num_coarse": int(cfg.scale.train_num_coarse)}
     pictured = setting.pictured[0]
     one = subject(pictured, network, num_pixels=pictured.camera.width * pictured.camera.height)
     curves = loss_curves(

@@ -7,7 +7,7 @@ from typing import Any
 from benchmarks.untrained import network_of
 from charnerf.bench.subjects import Pictured, subject
 from charnerf.bench.training_step import batch_of, step_timings
-from charnerf.bench.workbench import CULLED, DENSE, settings_of
+from charnerf.bench.workbench import CULLED, DENSE
 from charnerf.inference.build import build_renderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
@@ -18,7 +18,7 @@ def step_at_scale(pictured: Pictured, scale: str, *, repeats: int) -> dict[str, 
     network, cfg = network_of((f"scale={scale}",))
     num_rays = int(cfg.scale.phase_rays[0])
     renderer = build_renderer(cfg)
-    like = {**settings_of(renderer), "num_coarse": int(cfg.scale.train_num_coarse)}
+    like = {**renderer.settings, "num_coarse": int(cfg.scale.train_num_coarse)}
     one = subject(pictured, network, num_pixels=num_rays)
     renderers = {CULLED: CulledRenderer(**like), DENSE: DenseRenderer(**like)}
     timings = step_timings(one, batch_of(one, num_rays), renderers, repeats=repeats)

@@ -8,10 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, final
 
+import torch
 from torch import Tensor
 
 from charnerf.geometry.bounds import Bounds
 from charnerf.types import FieldOutput, TensorRecord
+
+LATTICE_CELLS = 128  # along the longest side of a box, where a field has no lattice of its own
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,18 @@ class DensityOutput:
 
     densities: Tensor
     state: TensorRecord
+
+
+class AbstractColoring(ABC):
+    """Makes colours of what a field says about a place; no network takes part."""
+
+    @abstractmethod
+    def rgb_of(self, points: Tensor, appearance: Tensor) -> Tensor:
+        """Colours (P, 3) of points (P, 3) of an appearance (P, C)."""
+
+    @abstractmethod
+    def at_width(self, width: int) -> "AbstractColoring":
+        """By drawings so many pixels wide, for large pictures; itself where there are none."""
 
 
 class AbstractField(ABC):
@@ -54,6 +69,27 @@ class AbstractField(ABC):
         """Colours (Q, 3) of (a part of) the state of a `DensityOutput`."""
         rgb: Tensor = state.rgb
         return rgb
+
+    def lattice(self, low: Tensor, high: Tensor) -> tuple[Tensor, float]:
+        """A point (3,), m, and the pitch, m, of the lattice that the field is smoothest on, for a box from low to high (3,)."""
+        return low, float((high - low).amax()) / LATTICE_CELLS
+
+    def uncut_densities(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Densities (P,), 1/m, without a direction, before the drawings cut them, and the share of them (P,) that these leave."""
+        densities = self.densities(points, torch.zeros_like(points)).densities
+        return densities, torch.ones_like(densities)
+
+    @property
+    def coloring(self) -> "AbstractColoring | None":
+        """How colours are made of an appearance; None where the field answers with colours alone."""
+        return None
+
+    def appearance(self, points: Tensor, view_dirs: Tensor) -> Tensor:
+        """What `coloring` makes colours of, (P, K, C), of points (P, 3) each seen along directions (K, 3).
+
+        It changes more slowly from point to point than colours, which may be read from pictures.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no coloring.")
 
     def at_width(self, width: int) -> "AbstractField":
         """The field with its colours read from drawings so many pixels wide, for large pictures; itself where there are none."""

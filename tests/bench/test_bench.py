@@ -16,7 +16,7 @@ from charnerf.bench.sweep import Row, pareto
 from charnerf.bench.tables import comparison_table, headline_table, markdown
 from charnerf.bench.timing import in_turns
 from charnerf.bench.training_step import batch_of, step_timings
-from charnerf.bench.workbench import BASELINE, settings_of
+from charnerf.bench.workbench import BASELINE
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from support import helpers
@@ -113,7 +113,7 @@ def test_psnr_of_known_errors():
 
 
 def test_settings_and_maps():
-    assert settings_of(CulledRenderer(**LIKE)) == LIKE
+    assert CulledRenderer(**LIKE).settings == LIKE
     one = tiny_subject()
     again = PixelAligned.of(one.network.encode(one.views))
     torch.testing.assert_close(again.feature_maps, one.maps.feature_maps)

@@ -41,7 +41,7 @@ class Workbench:
 
 def workbench(model: Model) -> Workbench:
     """Renderers of a model's settings."""
-    like = settings_of(model.renderer)
+    like = model.renderer.settings
     scale = compose_config([f"scale={TRAINING_SCALE}"]).scale
     in_training = {**like, "num_coarse": int(scale.train_num_coarse)}
     return Workbench(
@@ -56,14 +56,3 @@ def workbench(model: Model) -> Workbench:
         batch_rays=int(scale.phase_rays[0]),
         image_size=model.image_size,
     )
-
-
-def settings_of(renderer: AbstractRenderer) -> dict[str, Any]:
-    """Arguments that every renderer takes, of a given one."""
-    return {
-        "quadrature": renderer.quadrature,
-        "num_coarse": renderer.num_coarse,
-        "num_fine": renderer.num_fine,
-        "hull_steps": renderer.hull_steps,
-        "memory_mib": renderer.memory_mib,
-    }

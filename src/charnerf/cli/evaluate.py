@@ -40,7 +40,7 @@ Kept = Annotated[
     ),
 ]
 Renderer = Annotated[
-    Literal["culled", "dense", "adaptive"] | None,
+    Literal["culled", "dense", "adaptive", "baked"] | None,
     typer.Option(help="Another renderer than the model was trained with."),
 ]
 Mesh = Annotated[bool, typer.Option(help="Make every mesh, for Chamfer and F-score.")]

@@ -55,6 +55,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     ),
     "renderer": (
         f"{RENDERERS}.adaptive.AdaptiveRenderer",
+        f"{RENDERERS}.baked.BakedRenderer",
         f"{RENDERERS}.culled.CulledRenderer",
         f"{RENDERERS}.dense.DenseRenderer",
     ),

@@ -132,11 +132,12 @@ def _ours(
     sources = character.sources.to(watch.device)
     with watch.stage("encode"):
         scene = network.scene(network.encode(sources), 0)
+        looked_at = renderer.prepared(scene)
     pictures, left_out = [], LeftOut()
     for index in frames:
         camera = character.cameras[index].to(watch.device)
         with watch.stage("render"):
-            rendering = renderer.render_camera(scene, camera)
+            rendering = renderer.render_camera(looked_at, camera)
         pictures.append(to_cpu(rendering.finest, name=f"{character.name}, view {index}"))
         left_out += rendering.left_out
         on_picture()

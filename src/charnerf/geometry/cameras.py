@@ -243,3 +243,28 @@ def directions_to_points(cameras: Cameras, points: Tensor) -> Tensor:
     along_axis = -cameras.world_from_camera[:, :3, 2]
     towards = safe_normalize(points[:, None] - cameras.world_from_camera[:, :3, 3])
     return torch.where(cameras.orthographic[:, None], along_axis, towards)
+
+
+def pixel_lattice(cameras: Cameras) -> tuple[Tensor, float] | None:
+    """The lattice of pixel centres of orthographic cameras (V,) that look along the world's axes: maps of pictures bend there.
+
+    Returns:
+        A point of it, (3,), m, and its pitch, m, the finest pixel; along an axis that no picture lies along it goes through 0. None
+        where no camera is orthographic.
+    """
+    if not bool(cameras.orthographic.any()):
+        return None
+    flat = cameras[cameras.orthographic]
+    pitch = 1.0 / float(flat.focal.amax())
+    through = torch.zeros_like(flat.world_from_camera[0, :3, 3])
+    for image_axis in (1, 0):
+        axes, centres = flat.world_from_camera[:, :3, image_axis], flat.world_from_camera[:, :3, 3]
+        first = (0.5 - flat.principal_point[:, image_axis]) / flat.focal[
+            :, image_axis
+        ]  # m from the principal point
+        sign = -1.0 if image_axis == 1 else 1.0  # rows run down
+        for axis, centre, offset in zip(axes, centres, sign * first, strict=True):
+            along = int(axis.abs().argmax())
+            if abs(float(axis[along])) > 1.0 - 1e-6:
+                through[along] = centre[along] + axis[along] * offset
+    return through, pitch

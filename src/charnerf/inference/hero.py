@@ -21,6 +21,7 @@ from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.meshing.symmetry import symmetric_scene
 from charnerf.scene import Scene
 from charnerf.types import Cameras, SourceViews
+from charnerf.volume.renderers.baked import TOLERANCE, BakedRenderer
 from charnerf.volume.renderers.base import AbstractRenderer
 
 if TYPE_CHECKING:
@@ -110,6 +111,20 @@ class Hero:
     def symmetric(self) -> Hero:
         """The character as its own mirror image: densities averaged over left and right, for meshes and views."""
         return replace(self, scene=symmetric_scene(self.scene))
+
+    def baked(self, tolerance: float = TOLERANCE) -> Hero:
+        """The character evaluated once on a grid, for many views of it: see `renderer=baked`; as it is where it can not be.
+
+        Args:
+            tolerance: Error of a colour that is aimed at, in [0, 1]; 0 leaves it as it is.
+
+        Raises:
+            ConfigError: If the tolerance is negative or not finite.
+        """
+        if not 0.0 <= tolerance < math.inf:
+            raise ConfigError(f"tolerance: found {tolerance}, expected a number from 0 on.")
+        renderer = BakedRenderer(**self.renderer.settings, tolerance=tolerance)
+        return replace(self, scene=renderer.prepared(self.scene), renderer=renderer)
 
     def lods(
         self,

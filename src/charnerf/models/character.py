@@ -3,8 +3,11 @@
 from dataclasses import dataclass, replace
 from typing import final
 
+import torch
 from torch import Tensor
 
+from charnerf.geometry.cameras import pixel_lattice
+from charnerf.models.coloring import DrawnColoring
 from charnerf.models.density.base import TrunkOutput
 from charnerf.models.field import Field
 from charnerf.models.inputs import FieldInputs, PointViews
@@ -12,6 +15,7 @@ from charnerf.models.view_maps import Pictures, ViewMaps
 from charnerf.scene import AbstractField, DensityOutput
 from charnerf.types import FieldOutput, TensorRecord
 
+UNSEEN_SCORE = -30.0  # of a view that does not see a point, where scores are interpolated: a share of 1e-13
 BYTES_PER_FEATURE = 64  # of a view and a point, gradient kept: some 16 tensors of float32; measured, generous
 
 
@@ -70,6 +74,32 @@ class CharacterField(AbstractField):
     def colors(self, state: PendingColors) -> Tensor:
         """Colours (Q, 3)."""
         return self.field.colors(state.trunk, self._sharpened(state.views), state.view_dirs)
+
+    def lattice(self, low: Tensor, high: Tensor) -> tuple[Tensor, float]:
+        """The drawings' pixels, where all that is read of them bends; feature maps bend in the middle between two."""
+        return pixel_lattice(self.maps.cameras) or super().lattice(low, high)
+
+    def uncut_densities(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Densities (P,) before the drawings' coverage cuts them, and the share of them that it leaves."""
+        inputs = self.read(points)
+        trunk = self.field.trunk(inputs, torch.zeros_like(points))
+        return self.field.densities(trunk, torch.ones_like(inputs.kept)), inputs.kept
+
+    def appearance(self, points: Tensor, view_dirs: Tensor) -> Tensor:
+        """What the head makes colours of, (P, K, C), of points (P, 3) seen along (K, 3): the trunk is asked once."""
+        inputs = self.read(points)
+        trunk = self.field.trunk(inputs, torch.zeros_like(points))
+        return torch.stack(
+            [self.field.appearance(trunk, inputs.views, one.expand_as(points)) for one in view_dirs], dim=1
+        ).clamp_min(UNSEEN_SCORE)
+
+    @property
+    def coloring(self) -> DrawnColoring:
+        """By the head, of drawings as wide as the field reads them."""
+        encoded = self.maps.colors
+        return DrawnColoring(
+            type(self.field.head), self.maps.cameras, encoded, self.detailed, self.pictures or encoded
+        )
 
     def at_width(self, width: int) -> "CharacterField":
         """Colours from the detailed drawings, so many pixels wide; from the encoded ones where those are as wide."""

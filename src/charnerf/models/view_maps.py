@@ -16,7 +16,7 @@ from charnerf.geometry.resizing import resized_pictures
 from charnerf.models.inputs import FieldInputs, PointViews
 from charnerf.models.lookup import bilinear_rows, first_pixels, maps_to_rows, read_rows
 from charnerf.pictures import images_on_white
-from charnerf.types import Cameras, Hull, SourceViews
+from charnerf.types import Cameras, Hull, MovableRecord, SourceViews
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,11 @@ class ViewMaps:
             sections=cross_sections(hull) if sections and hull is not None else None,
         )
 
+    @property
+    def colors(self) -> "Pictures":
+        """The drawings' colours alone."""
+        return Pictures(self.pictures[:, :3].contiguous(), (self.cameras.width, self.cameras.height))
+
     def read(self, points: Tensor, latents: Tensor) -> FieldInputs:
         """Read features (rows (V * h * w, L)), drawings and hull maps at points (P, 3)."""
         cameras, leading = self.cameras, (points.shape[0], self.cameras.shape[0])
@@ -178,7 +183,7 @@ class ViewMaps:
 
 
 @dataclass(frozen=True)
-class Pictures:
+class Pictures(MovableRecord):
     """Drawings of one character on white as rows, for colours at their own resolution.
 
     Attributes:

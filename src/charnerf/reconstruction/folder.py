@@ -176,10 +176,13 @@ def _pictures_and_mesh(
     hero: Hero, options: ReconstructionOptions, seconds: dict[str, float], progress: Progress
 ) -> tuple[list[np.ndarray], BuiltMesh]:
     """Pictures from around, RGBA uint8, and the mesh."""
+    progress.stage("bake")
+    with _timed(seconds, "bake"):
+        baked = hero.baked()
     progress.stage("pictures")
     with _timed(seconds, f"{options.frames} frames of {options.size} pixels"):
         on_frame = progress.counter(options.frames)
-        pictures = render_around(hero, options.frames, options.size, on_frame=on_frame)
+        pictures = render_around(baked, options.frames, options.size, on_frame=on_frame)
     progress.stage("mesh")
     with _timed(seconds, "mesh"):
         built = hero.build_mesh(options.mesh, on_points=meter(progress, (options.mesh.resolution,)))

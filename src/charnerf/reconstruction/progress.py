@@ -8,8 +8,8 @@ from charnerf.progress import Progress
 from charnerf.reconstruction.options import ReconstructionOptions
 
 # seconds on two cores
-ENCODE, WRITE = 1.0, 3.0
-FRAME = 0.85  # of 192 pixels
+ENCODE, BAKE, WRITE = 1.0, 5.0, 3.0
+FRAME = 0.15  # of 192 pixels
 SURFACE = 10.0  # of a grid of 128
 TEXTURE = 1.0 / 4000.0  # a face
 ALL_FACES = 30_000  # of a grid of 128
@@ -19,7 +19,7 @@ MESH_POINTS = 0.1  # of the grid, evaluated in the usual case
 def reconstruction_stages(options: ReconstructionOptions) -> dict[str, float]:
     """Seconds that each stage of a reconstruction takes, about."""
     refine = {} if options.refine_seconds is None else {"refine": options.refine_seconds}
-    pictures = {"pictures": options.frames * FRAME * (options.size / 192.0) ** 2}
+    pictures = {"bake": BAKE, "pictures": options.frames * FRAME * (options.size / 192.0) ** 2}
     return {"encode": ENCODE, **refine, **pictures, "mesh": mesh_seconds(options.mesh), "files": WRITE}
 
 

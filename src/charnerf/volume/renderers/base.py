@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -63,6 +64,17 @@ class AbstractRenderer(ABC):
         self.memory_mib = memory_mib
         self.points_at_once = POINTS_AT_ONCE
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Arguments that every renderer takes, of this one."""
+        return {
+            "quadrature": self.quadrature,
+            "num_coarse": self.num_coarse,
+            "num_fine": self.num_fine,
+            "hull_steps": self.hull_steps,
+            "memory_mib": self.memory_mib,
+        }
+
     @abstractmethod
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,).
@@ -72,6 +84,10 @@ class AbstractRenderer(ABC):
             rays: Rays (R,).
             generator: Jitters the samples (training); without it the result is deterministic.
         """
+
+    def prepared(self, scene: Scene) -> Scene:
+        """The scene as it is best looked at many times: with what this renderer computes once for all of its pictures."""
+        return scene
 
     def render_camera(self, scene: Scene, camera: Cameras) -> Rendering:
         """Render the picture of one camera, without gradient; fields come as (H, W, ...)."""

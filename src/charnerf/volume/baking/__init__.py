@@ -1,0 +1,1 @@
+"""A character evaluated once on a grid, and looked at there."""

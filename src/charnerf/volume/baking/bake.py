@@ -1,0 +1,277 @@
+"""From a character's field to a grid of it: what may hold something and what light reaches is evaluated, and nothing else.
+
+Letters: P points, K directions, C values that a colour is made of.
+"""
+
+import logging
+import math
+import time
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from charnerf.scene import Scene
+from charnerf.volume.baking.directions import (
+    NUM_POLYNOMIALS,
+    polynomials,
+    projection,
+    sampled_directions,
+)
+from charnerf.volume.baking.grid import (
+    EMPTY,
+    EMPTY_U,
+    OPAQUE,
+    OPAQUE_U,
+    BakedGrid,
+    combined,
+    densities_from_u,
+    interpolated,
+    u_from_densities,
+)
+from charnerf.volume.baking.lattice import (
+    Lattice,
+    any_corner,
+    corners_of,
+    finer_points,
+    gaps,
+    light_depths,
+)
+from charnerf.volume.marching import points_at_once
+
+log = logging.getLogger(__name__)
+
+FACTOR = 2  # steps of the fine grid in one of the lattice
+UNSEEN_SHARE = 0.1  # of the tolerance: light that is followed no further
+FAINT_SHARE = (
+    0.1  # of the tolerance: opacity of a metre of what counts as empty, and of a cell that is not refined
+)
+LEAST_POINTS = 16  # of the lattice along its longest side, however little memory there is
+TYPICAL_VALUES = 8  # that a colour is made of, for the estimate of memory
+
+
+@dataclass(frozen=True)
+class Baked:
+    """A grid, and what it took.
+
+    Attributes:
+        grid: The grid.
+        coarser: Times that its steps are as long as asked, so that it fits into its memory.
+        num_densities: Points whose density was evaluated.
+        num_colors: Points whose colours were evaluated, along some directions each.
+        num_points: Points of the whole box, for comparison.
+        seconds: Time it took.
+    """
+
+    grid: BakedGrid
+    coarser: int
+    num_densities: int
+    num_colors: int
+    num_points: int
+    seconds: float
+
+
+@torch.no_grad()
+def bake(scene: Scene, *, tolerance: float, memory_mib: float, factor: int = FACTOR) -> Baked:
+    """Evaluate a scene's finest field on a grid; its density must not see the direction.
+
+    Args:
+        scene: One character's field.
+        tolerance: Error of a colour that pictures may have; decides what is too faint or too dark to be evaluated.
+        memory_mib: What the grid may take, MiB: it is made coarser where it would take more, and that is logged.
+        factor: Steps of the grid in one of the field's lattice.
+    """
+    start = time.perf_counter()
+    coarser, asked = 1, 0
+    while True:
+        coarse = _Coarse.of(scene, tolerance, coarser)
+        asked += coarse.num_evaluated
+        taken = coarse.mib(factor, scene.field.coloring is not None)
+        if taken <= memory_mib or max(coarse.lattice.shape) <= LEAST_POINTS:
+            break
+        coarser += 1
+        log.warning(
+            "renderer=baked: a grid in steps of %.1f mm takes %.0f MiB, renderer.memory_mib=%.0f is less: made %d times as coarse.",
+            1000.0 * coarse.lattice.pitch / factor,
+            taken,
+            memory_mib,
+            coarser,
+        )
+    lattice = coarse.lattice
+    fine = _Fine.of(scene, coarse, factor)
+    beyond = finer_points(any_corner(coarse.dark) & ~coarse.holding, factor) & (fine.index == EMPTY)
+    color_index, color_rows = _colors(scene, coarse)
+    low, high = scene.bounds.tight_box
+    grid = BakedGrid(
+        low=low,
+        high=high,
+        origin=lattice.origin,
+        pitch=lattice.pitch,
+        factor=factor,
+        index=torch.where(beyond, OPAQUE, fine.index).int(),
+        rows=fine.rows,
+        color_index=color_index,
+        color_rows=color_rows,
+        gaps=gaps(coarse.holding),
+    )
+    return Baked(
+        grid=grid,
+        coarser=coarser,
+        num_densities=asked + fine.num_evaluated,
+        num_colors=len(color_rows) - 1,
+        num_points=fine.index.numel(),
+        seconds=time.perf_counter() - start,
+    )
+
+
+@dataclass(frozen=True)
+class _Coarse:
+    """A scene on its lattice, and what is to be found out beyond that.
+
+    Attributes:
+        lattice: The lattice, X, Y, Z points.
+        u: Of its points' densities before they are cut, (X, Y, Z).
+        kept: The share of them that is left, (X, Y, Z).
+        dark: Which points no light reaches, (X, Y, Z) bool.
+        holding: Which cells hold something that light reaches, (X - 1, Y - 1, Z - 1) bool.
+        refined: Which of them hold so much that it is worth to be known better.
+        num_evaluated: Points that the field was asked for.
+    """
+
+    lattice: Lattice
+    u: Tensor
+    kept: Tensor
+    dark: Tensor
+    holding: Tensor
+    refined: Tensor
+    num_evaluated: int
+
+    @classmethod
+    def of(cls, scene: Scene, tolerance: float, coarser: int) -> "_Coarse":
+        """Evaluate a scene on a lattice so many times as coarse as its field's own."""
+        lattice = Lattice.of(scene, coarser)
+        around = corners_of(any_corner(lattice.held(scene)))
+        u = lattice.origin.new_full(lattice.shape, EMPTY_U)
+        kept = torch.zeros_like(u)
+        u[around], kept[around] = _asked(scene, lattice.points(around.nonzero()))
+        densities, faint = densities_from_u(u) * kept, FAINT_SHARE * tolerance
+        dark = light_depths(densities, lattice.pitch) > -math.log(UNSEEN_SHARE * tolerance)
+        holding = any_corner(densities > faint) & any_corner(~dark)
+        refined = holding & any_corner(densities > faint / lattice.pitch)
+        return cls(lattice, u, kept, dark, holding, refined, int(around.sum()))
+
+    @property
+    def densities(self) -> Tensor:
+        """Of its points, (X, Y, Z), 1/m."""
+        return densities_from_u(self.u) * self.kept
+
+    def mib(self, factor: int, has_colors: bool) -> float:
+        """What its grid takes, about, MiB."""
+        colors = int(corners_of(self.refined).sum()) * NUM_POLYNOMIALS * TYPICAL_VALUES if has_colors else 0
+        points = int(finer_points(self.holding, factor).sum())
+        return 4.0 * (self.u.numel() * factor**3 + 3 * points + colors) / 2**20
+
+
+def _asked(scene: Scene, points: Tensor) -> tuple[Tensor, Tensor]:
+    """Values u (P,) of points (P, 3) and the share (P,) of the density that drawings and hull leave, chunk by chunk."""
+    us, shares = [points.new_zeros(0)], [points.new_zeros(0)]
+    for some in points.split(points_at_once(scene.field)):
+        densities, share = scene.field.uncut_densities(some)
+        us.append(u_from_densities(densities))
+        shares.append(share * scene.bounds.may_hold(some))
+    return torch.cat(us), torch.cat(shares)
+
+
+@dataclass(frozen=True)
+class _Fine:
+    """The fine grid: index of its points, 0 where they are in no cell that holds something; rows, the first two as `grid` says."""
+
+    index: Tensor
+    rows: Tensor
+    num_evaluated: int
+
+    @classmethod
+    def of(cls, scene: Scene, coarse: _Coarse, factor: int) -> "_Fine":
+        """Evaluate the points of refined cells that are not on the lattice; interpolate those of others.
+
+        The error of a density is that of the lattice, which the new points show, over the square of the factor.
+        """
+        lattice, used = coarse.lattice, finer_points(coarse.holding, factor)
+        places = used.nonzero()
+        index = used.int()
+        index[used] = torch.arange(2, len(places) + 2, dtype=torch.int32, device=index.device)
+        rows = torch.stack((coarse.u.reshape(-1), coarse.kept.reshape(-1)), dim=-1)
+        numbers = torch.arange(len(rows), dtype=torch.int32, device=index.device).view(lattice.shape)
+        between = interpolated(numbers, rows, places.to(rows.dtype) / factor)
+        new = finer_points(coarse.refined, factor)[used] & (places % factor != 0).any(-1)
+        found = torch.stack(_asked(scene, lattice.points(places[new], factor)), dim=-1)
+        filled = between.index_put((new,), found)
+        off = (
+            densities_from_u(filled[:, 0]) * filled[:, 1] - densities_from_u(between[:, 0]) * between[:, 1]
+        ).abs()
+        fixed = rows.new_tensor(((EMPTY_U, 0.0, 0.0), (OPAQUE_U, 1.0, 0.0)))
+        filled = torch.cat((fixed, torch.cat((filled, off[:, None] / factor**2), dim=-1)))
+        return cls(index, filled, len(found))
+
+
+def _colors(scene: Scene, coarse: _Coarse) -> tuple[Tensor, Tensor]:
+    """Index and rows of the colours of the corners of refined cells; none where the field has no coloring."""
+    wanted, field, coloring = corners_of(coarse.refined), scene.field, scene.field.coloring
+    if coloring is None or not bool(wanted.any()):
+        return torch.zeros_like(wanted, dtype=torch.int32), coarse.u.new_zeros(1, 1)
+    points = coarse.lattice.points(wanted.nonzero())
+    directions = sampled_directions().to(points)
+    into, back = projection(points), polynomials(directions)
+    index = wanted.int()
+    index[wanted] = torch.arange(1, len(points) + 1, dtype=torch.int32, device=index.device)
+    rows = []
+    for some in points.split(points_at_once(field)):
+        parts = field.appearance(some, directions)  # (P, K, C)
+        coefficients = torch.einsum("bk,pkc->pbc", into, parts)
+        fitted = torch.einsum("kb,pbc->pkc", back, coefficients)
+        off = [
+            (coloring.rgb_of(some, one) - coloring.rgb_of(some, other)).abs().amax(-1)
+            for one, other in zip(parts.unbind(1), fitted.unbind(1), strict=True)
+        ]
+        rows.append(
+            torch.cat((coefficients.flatten(1), torch.stack(off).square().mean(0).sqrt()[:, None]), dim=-1)
+        )
+    filled = torch.cat((torch.zeros_like(rows[0][:1]), *rows))
+    filled[1:, -1] += _missed_between(scene, coarse, index, filled)[wanted]
+    return index, filled
+
+
+def _missed_between(scene: Scene, coarse: _Coarse, index: Tensor, rows: Tensor) -> Tensor:
+    """Errors of colours in the middles of cells, seen into the surface: the largest around each of the points (X, Y, Z)."""
+    field, coloring, cells, densities = scene.field, scene.field.coloring, coarse.refined, coarse.densities
+    assert coloring is not None  # its caller has asked
+    slopes = torch.stack([_difference(densities, axis)[cells] for axis in range(3)], dim=-1)
+    flat = slopes.norm(dim=-1, keepdim=True) < 1e-6
+    inward = torch.where(flat, slopes.new_tensor((0.0, 1.0, 0.0)), slopes)
+    inward = inward / inward.norm(dim=-1, keepdim=True)
+    middles = cells.nonzero() + 0.5
+    points, size = coarse.lattice.points(middles), points_at_once(field)
+    found = combined(interpolated(index, rows, middles)[:, :-1], polynomials(inward))
+    pieces = zip(points.split(size), inward.split(size), found.split(size), strict=True)
+    off = [(coloring.rgb_of(at, by) - field(at, along).rgb).abs().amax(-1) for at, along, by in pieces]
+    errors = densities.new_zeros(densities.shape)
+    errors[:-1, :-1, :-1][cells] = torch.cat(off)
+    return _largest_before(errors)  # the cells around a point begin at it or a step before
+
+
+def _difference(values: Tensor, axis: int) -> Tensor:
+    """Differences along an axis, of points (X, Y, Z), summed over the cells (X - 1, Y - 1, Z - 1)."""
+    for other in range(3):
+        size = values.shape[other] - 1
+        first, second = values.narrow(other, 0, size), values.narrow(other, 1, size)
+        values = second - first if other == axis else first + second
+    return values
+
+
+def _largest_before(values: Tensor) -> Tensor:
+    """Largest of the values (X, Y, Z) of each point and of those up to one step before it along every axis."""
+    for axis in range(3):
+        size = values.shape[axis] - 1
+        later = torch.maximum(values.narrow(axis, 0, size), values.narrow(axis, 1, size))
+        values = torch.cat((values.narrow(axis, 0, 1), later), dim=axis)
+    return values

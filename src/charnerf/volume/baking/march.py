@@ -1,0 +1,132 @@
+"""Rays through a baked grid: empty space is stepped over, and nothing is looked at behind opaque surface.
+
+Letters: R rays, r those under way, S samples at once, P groups of samples that count.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from charnerf.geometry.rays import box_interval
+from charnerf.types import RayBundle, TensorRecord
+from charnerf.volume.baking.grid import BakedGrid
+
+AT_ONCE = 3  # samples of a ray between two looks at how much light is left; they share a colour, in the middle of their light
+SPACING = 1.5  # steps of the fine grid between samples
+FAINT_SHARE = (
+    0.2  # of the light that is followed no further: groups that take less have no colour of their own
+)
+BORDER = 1e-5  # m that a ray goes on beyond the border of a cell, so that rounding does not hold it there
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What rays (R,) meet in a grid.
+
+    Attributes:
+        rows: The rays of the groups that count, (P,).
+        t_vals: Where these lie, in the middle of their light, (P,), m.
+        weights: Their shares of their ray's light, (P,).
+        passed: Light that is left, (R,).
+        far: Where they leave the grid, (R,), m.
+        errors: Of the rays' opacity, estimated, (R,).
+        num_samples: Densities read.
+    """
+
+    rows: Tensor
+    t_vals: Tensor
+    weights: Tensor
+    passed: Tensor
+    far: Tensor
+    errors: Tensor
+    num_samples: int
+
+
+@dataclass(frozen=True)
+class _UnderWay(TensorRecord):
+    """Rays (r,) under way: their numbers, where they began and go, in cells of the lattice, where they are and end, m."""
+
+    rows: Tensor
+    origins: Tensor
+    directions: Tensor
+    t_vals: Tensor
+    ends: Tensor
+
+    def at(self, t_vals: Tensor) -> Tensor:
+        """Places (r, S, 3) at distances (r, S), m, counted in cells."""
+        return torch.addcmul(self.origins[:, None], self.directions[:, None], t_vals[..., None])
+
+
+def march(grid: BakedGrid, rays: RayBundle, *, unseen: float) -> Seen:
+    """Follow rays (R,) through a grid.
+
+    Args:
+        grid: The grid.
+        rays: Rays (R,).
+        unseen: Light that is followed no further; groups that take less than a fifth of it do not count.
+    """
+    near, far = box_interval(rays, grid.low, grid.high)
+    light, errors, spacing = torch.ones_like(near), torch.zeros_like(near), SPACING * grid.step
+    rows = (far > near).nonzero()[:, 0]
+    way = _UnderWay(
+        rows,
+        (rays.origins[rows] - grid.origin) / grid.pitch,
+        rays.directions[rows] / grid.pitch,
+        near[rows],
+        far[rows],
+    )
+    offsets = (torch.arange(AT_ONCE, dtype=near.dtype, device=near.device) + 0.5) * spacing
+    groups: list[tuple[Tensor, Tensor, Tensor]] = [(rows[:0], near[:0], near[:0])]
+    num_samples = 0
+    while len(way.rows):
+        gap = _gaps_at(grid, way)
+        t_vals = way.t_vals + _free_way(way, gap)
+        holding = (gap == 0.0).nonzero()[:, 0]
+        if len(holding):
+            here = way[holding]
+            samples = here.t_vals[:, None] + offsets
+            lengths = (here.ends[:, None] - samples + 0.5 * spacing).clamp(0.0, spacing)
+            depths, off = _read(grid, here.at(samples), lengths)
+            after = light[here.rows, None] * torch.exp(-depths.cumsum(-1))
+            weights = torch.cat((light[here.rows, None], after[:, :-1]), dim=-1) - after
+            light[here.rows] = after[:, -1]
+            errors[here.rows] += (after * off).square().sum(-1)
+            groups.append(_group(here.rows, samples, weights, FAINT_SHARE * unseen))
+            t_vals = t_vals.index_copy(0, holding, here.t_vals + AT_ONCE * spacing)
+            num_samples += samples.numel()
+        on = ((t_vals < way.ends) & (light[way.rows] > unseen)).nonzero()[:, 0]
+        way = _UnderWay(way.rows, way.origins, way.directions, t_vals, way.ends)[on]
+    found = [torch.cat(parts) for parts in zip(*groups, strict=True)]
+    return Seen(found[0], found[1], found[2], light, far, errors.sqrt(), num_samples)
+
+
+def _group(rows: Tensor, samples: Tensor, weights: Tensor, least: float) -> tuple[Tensor, Tensor, Tensor]:
+    """Rays, middles, m, and weights (P,) of groups of samples (r, S) that take enough light."""
+    total = weights.sum(-1)
+    chosen = (total > least).nonzero()[:, 0]
+    middles = (weights * samples).sum(-1)[chosen] / total[chosen]
+    return rows[chosen], middles, total[chosen]
+
+
+def _gaps_at(grid: BakedGrid, way: _UnderWay) -> Tensor:
+    """Cells (r,) from where rays are to the next one that holds something."""
+    size_x, size_y, size_z = grid.gaps.shape
+    x, y, z = way.at(way.t_vals[:, None])[:, 0].int().unbind(-1)
+    flat = (x.clamp_(0, size_x - 1) * size_y + y.clamp_(0, size_y - 1)) * size_z + z.clamp_(0, size_z - 1)
+    return grid.gaps.reshape(-1)[flat].to(way.t_vals.dtype)
+
+
+def _free_way(way: _UnderWay, gap: Tensor) -> Tensor:
+    """How far rays (r,) may go on until they come to a cell that may hold something, m; 0 in one that does."""
+    at = way.at(way.t_vals[:, None])[:, 0]
+    inside = at - at.floor()
+    left = torch.where(way.directions < 0.0, inside, 1.0 - inside)  # to the border of the own cell
+    free = ((left + (gap - 1.0)[:, None]) / way.directions.abs().clamp_min(1e-6)).amin(-1) + BORDER
+    return torch.where(gap > 0.0, free, 0.0)
+
+
+def _read(grid: BakedGrid, at: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+    """Optical depths (r, S) of samples at places (r, S, 3), in cells, that stand for lengths (r, S), m, and their errors."""
+    densities, errors = grid.read_densities(at.reshape(-1, 3) * grid.factor)
+    return densities.view(lengths.shape) * lengths, errors.view(lengths.shape) * lengths

@@ -1,0 +1,129 @@
+"""Looks at a character that was evaluated once on a grid, by a tolerance, and says what error it made.
+
+Letters: R rays, P groups of samples that have one colour.
+"""
+
+import logging
+from typing import final
+
+import torch
+from torch import Tensor
+
+from charnerf.scene import Scene
+from charnerf.types import ErrorEstimate, LeftOut, RayBundle, Rendering, RenderOutput
+from charnerf.volume.baking.bake import UNSEEN_SHARE, bake
+from charnerf.volume.baking.field import BakedField
+from charnerf.volume.baking.march import Seen, march
+from charnerf.volume.quadrature.base import AbstractQuadrature
+from charnerf.volume.renderers.base import WHITE, AbstractRenderer
+from charnerf.volume.renderers.culled import CulledRenderer
+
+log = logging.getLogger(__name__)
+
+TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
+
+
+@final
+class BakedRenderer(AbstractRenderer):
+    """Renders scenes that its `prepared` has baked by their grid, and all others as the culled renderer.
+
+    Training (with a generator, or where gradients are kept), single pictures, models whose density sees the direction, and a
+    tolerance of 0, which asks for exactness, are the culled renderer's.
+
+    Args:
+        quadrature: As the culled renderer.
+        num_coarse: As the culled renderer; the count that what is left out is compared with.
+        num_fine: As the culled renderer.
+        hull_steps: As the culled renderer.
+        memory_mib: Bound on what the grid takes, and on what is held at once, MiB.
+        tolerance: Error of a colour that is aimed at, in [0, 1].
+    """
+
+    def __init__(
+        self,
+        *,
+        quadrature: AbstractQuadrature,
+        num_coarse: int,
+        num_fine: int,
+        hull_steps: int,
+        memory_mib: float,
+        tolerance: float,
+    ) -> None:
+        super().__init__(
+            quadrature=quadrature,
+            num_coarse=num_coarse,
+            num_fine=num_fine,
+            hull_steps=hull_steps,
+            memory_mib=memory_mib,
+        )
+        self.tolerance = tolerance
+        self._culled = CulledRenderer(**self.settings)
+
+    def prepared(self, scene: Scene) -> Scene:
+        """The scene with its finest field baked, for many pictures of it; as it is where it can not be."""
+        if self.tolerance <= 0.0 or isinstance(scene.field, BakedField):
+            return scene
+        if scene.field.sees_directions:
+            log.warning(
+                "renderer=baked: the density of this model depends on the direction, a grid would hold one of them; rendered as "
+                "renderer=culled. density=view_free can be baked."
+            )
+            return scene
+        baked = bake(scene, tolerance=self.tolerance, memory_mib=self.memory_mib)
+        return Scene(BakedField(baked, scene.field.coloring, scene.field), None, scene.bounds)
+
+    def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
+        """Render rays (R,): by the grid of a prepared scene, without a generator and gradients; else as the culled renderer."""
+        field = scene.field
+        if not isinstance(field, BakedField) or generator is not None or torch.is_grad_enabled():
+            return self._culled.render(scene, rays, generator)
+        with torch.inference_mode():
+            seen = march(field.grid, rays, unseen=UNSEEN_SHARE * self.tolerance)
+        return self._colored(field, rays, seen)
+
+    def _colored(self, field: BakedField, rays: RayBundle, seen: Seen) -> Rendering:
+        """Give what rays (R,) see its colours."""
+        num_rays, unseen = len(seen.passed), UNSEEN_SHARE * self.tolerance
+        along = rays.directions[seen.rows]
+        points = torch.addcmul(rays.origins[seen.rows], along, seen.t_vals[:, None])
+        rgb, errors = field.colors_at(points, along)
+        opacity = torch.where(seen.passed > unseen, 1.0 - seen.passed, 1.0)
+        counted = _by_ray(seen, seen.weights)
+        # what was too little to count, or behind all light, has the colour of the rest
+        share = seen.weights * (opacity / counted.clamp_min(1e-6))[seen.rows]
+        off = _by_ray(seen, share * errors)
+        asked = (off > self.tolerance)[seen.rows].nonzero()[:, 0]
+        if field.source is not None and len(asked):
+            rgb[asked] = field.exact_colors(points[asked], along[asked])
+            off[seen.rows[asked]] = 0.0
+        uncounted = torch.where(counted > 0.0, 0.0, opacity)
+        estimated = (off.square() + seen.errors.square()).sqrt() + uncounted
+        moment = _by_ray(seen, seen.weights * seen.t_vals)
+        total = max(len(asked), num_rays * self.num_coarse)
+        return Rendering(
+            finest=RenderOutput(
+                rgb=_by_ray(seen, share[:, None] * rgb) + (1.0 - _by_ray(seen, share))[:, None] * WHITE,
+                opacity=opacity,
+                depth=torch.where(counted > 0.0, moment / counted.clamp_min(1e-6), seen.far),
+            ),
+            coarse=None,
+            left_out=LeftOut(
+                rays=num_rays - int(counted.count_nonzero()),
+                rays_of=num_rays,
+                samples=total - len(asked),
+                samples_of=total,
+            ),
+            estimate=ErrorEstimate(
+                tolerance=self.tolerance,
+                estimated=estimated,
+                num_samples=seen.num_samples,
+                num_colors=len(seen.rows),
+                num_stopped=int((seen.passed <= unseen).sum()),
+                num_unresolved=int((estimated > self.tolerance).sum()),
+            ),
+        )
+
+
+def _by_ray(seen: Seen, values: Tensor) -> Tensor:
+    """Sums of values (P, ...) over the groups of each ray, (R, ...)."""
+    return values.new_zeros(len(seen.passed), *values.shape[1:]).index_add_(0, seen.rows, values)

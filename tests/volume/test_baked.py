@@ -1,0 +1,177 @@
+"""The baked renderer: closed forms, its order, what it leaves to others, and that its grid fits into its memory."""
+
+import logging
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+
+from charnerf.geometry.bounds import Bounds
+from charnerf.geometry.cameras import pixel_centres, pixel_rays
+from charnerf.scene import FunctionField, Scene
+from charnerf.types import FieldOutput, RayBundle, Rendering
+from charnerf.volume.baking.bake import bake
+from charnerf.volume.baking.field import BakedField
+from charnerf.volume.quadrature import PiecewiseConstant
+from charnerf.volume.renderers.baked import BakedRenderer
+from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
+
+BOX = (torch.tensor((-0.8, -0.8, 0.2)), torch.tensor((0.8, 0.8, 1.8)))
+CENTRE = torch.tensor((0.0, 0.0, 1.0))
+RADIUS, DENSITY = 0.6, 2.0
+COMMON = {
+    "quadrature": PiecewiseConstant(),
+    "num_coarse": 16,
+    "num_fine": 0,
+    "hull_steps": 128,
+    "memory_mib": 256,
+}
+
+
+def baked(tolerance: float = 0.05, **changes: float) -> BakedRenderer:
+    return BakedRenderer(**{**COMMON, **changes}, tolerance=tolerance)
+
+
+def scene_of(density) -> Scene:
+    def answer(points: torch.Tensor, dirs: torch.Tensor) -> FieldOutput:
+        return FieldOutput(torch.full_like(points, 0.25), density(points))
+
+    return Scene(FunctionField(answer), None, Bounds(*BOX))
+
+
+def rays_of(size: int = 24) -> RayBundle:
+    return pixel_rays(helpers.target_cameras(4, size=size)[2], pixel_centres(size, size).reshape(-1, 2))
+
+
+def render(scene: Scene, rays: RayBundle, renderer: BakedRenderer) -> Rendering:
+    with torch.no_grad():
+        return renderer.render(renderer.prepared(scene), rays)
+
+
+def around(points: torch.Tensor) -> torch.Tensor:
+    return (points - CENTRE).norm(dim=-1)
+
+
+def chords(rays: RayBundle, radius: float) -> torch.Tensor:
+    """Lengths of rays in a ball around CENTRE, (R,), m."""
+    offset = rays.origins - CENTRE
+    near = offset - (offset * rays.directions).sum(-1, keepdim=True) * rays.directions
+    return 2.0 * (radius**2 - near.square().sum(-1)).clamp_min(0.0).sqrt()
+
+
+def ball(rays: RayBundle) -> torch.Tensor:
+    return chords(rays, RADIUS)
+
+
+def shell(rays: RayBundle) -> torch.Tensor:
+    return chords(rays, RADIUS) - chords(rays, 0.4)
+
+
+def slab(rays: RayBundle) -> torch.Tensor:
+    """0.3 m thick, across the x axis, within the box."""
+    t = ((torch.tensor((-0.15, 0.15)) - rays.origins[:, :1]) / rays.directions[:, :1]).sort(-1).values
+    first, last = ((BOX[k] - rays.origins) / rays.directions for k in (0, 1))
+    enter = torch.maximum(t[:, 0], torch.minimum(first, last).amax(-1))
+    leave = torch.minimum(t[:, 1], torch.maximum(first, last).amin(-1))
+    return (leave - enter).clamp_min(0.0)
+
+
+BODIES = {
+    "ball": (ball, lambda points: DENSITY * (around(points) < RADIUS)),
+    "shell": (shell, lambda points: DENSITY * ((around(points) < RADIUS) & (around(points) > 0.4))),
+    "slab": (slab, lambda points: DENSITY * (points[:, 0].abs() < 0.15)),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_homogeneous_bodies_have_their_analytic_opacity(name):
+    """Within the tolerance but where a ray grazes a jump of the density: there a step of the grid is a long chord."""
+    lengths, density = BODIES[name]
+    rays = rays_of()
+    found = render(scene_of(density), rays, baked())
+    step = (BOX[1] - BOX[0]).amax() / 256
+    exact = lengths(rays)
+    shifted = [lengths(replace(rays, origins=rays.origins + step * shift)) for shift in 2.0 * torch.eye(3)]
+    shifted += [lengths(replace(rays, origins=rays.origins - step * shift)) for shift in 2.0 * torch.eye(3)]
+    grazing = torch.stack([(one - exact).abs() for one in shifted]).amax(0) > 0.05
+    off = (found.finest.opacity - (1.0 - torch.exp(-DENSITY * exact))).abs()
+    assert int((~grazing & (exact > 0)).sum()) >= 30
+    assert float(off[~grazing].amax()) <= 0.05
+    assert float(off.mean()) <= 0.01
+
+
+@pytest.mark.parametrize(
+    ("density", "order", "spread"),
+    [
+        (lambda points: 8.0 * torch.exp(-((around(points) / 0.25) ** 2)), 2.0, 0.4),
+        (lambda points: DENSITY * (around(points) < RADIUS).float(), 1.0, 0.5),
+    ],
+    ids=["smooth", "a jump"],
+)
+def test_the_error_falls_with_the_step(density, order, spread):
+    """Quadratically on smooth densities, linearly where they jump."""
+    rays, scene = rays_of(20), scene_of(density)
+    fine = CulledRenderer(**{**COMMON, "num_coarse": 4096})
+    renderer, errors, steps = baked(1e-3), [], []
+    with torch.no_grad():
+        reference = fine.render(scene, rays).finest.opacity
+        for pitch in (0.16, 0.08, 0.04):
+
+            class Coarse(type(scene.coarse)):
+                def lattice(self, low, high, pitch=pitch):
+                    return low, pitch
+
+            grid = bake(replace(scene, coarse=Coarse(scene.coarse.function)), tolerance=1e-3, memory_mib=256)
+            found = renderer.render(Scene(BakedField(grid, None, scene.coarse), None, scene.bounds), rays)
+            errors.append(float((found.finest.opacity - reference).square().mean().sqrt()))
+            steps.append(grid.grid.step)
+    slope = math.log(errors[0] / errors[-1]) / math.log(steps[0] / steps[-1])
+    assert slope == pytest.approx(order, abs=spread)
+
+
+def test_a_trained_kind_of_field_is_within_the_tolerance():
+    model = tiny_models.tiny_model(views="mirrored").eval()
+    tiny_models.shake(model, scale=0.1)
+    with torch.no_grad():
+        scene = model.scene(model.encode(helpers.source_views(helpers.person())), 0)
+        rays = rays_of(20)
+        found = render(scene, rays, baked())
+        reference = (
+            CulledRenderer(**{**COMMON, "num_coarse": 512, "hull_steps": 512}).render(scene, rays).finest
+        )
+    assert float(reference.opacity.amax()) > 0.1
+    assert float((found.finest.rgb - reference.rgb).abs().amax()) <= 0.05
+    assert found.estimate is not None and found.estimate.num_samples > 0
+    assert found.left_out.samples > 0.5 * found.left_out.samples_of
+
+
+def test_what_can_not_be_baked_is_rendered_as_culled(caplog):
+    scene, rays = scene_of(BODIES["ball"][1]), rays_of(8)
+    culled = CulledRenderer(**COMMON).render(scene, rays).finest
+    directed = replace(scene, coarse=FunctionField(scene.coarse.function, sees_directions=True))
+    with caplog.at_level(logging.WARNING):
+        assert baked().prepared(directed) is directed
+    assert "density=view_free" in caplog.text
+    assert baked(tolerance=0.0).prepared(scene) is scene
+    assert torch.equal(baked().render(scene, rays).finest.rgb, culled.rgb)
+    prepared = baked().prepared(scene)
+    assert baked().prepared(prepared) is prepared
+    assert baked().render(prepared, rays).estimate is None  # gradients are kept here: as in training
+
+
+def test_a_grid_that_does_not_fit_is_coarser_and_says_so(caplog):
+    scene = scene_of(BODIES["ball"][1])
+    with caplog.at_level(logging.WARNING):
+        made = bake(scene, tolerance=0.05, memory_mib=8)
+    assert made.coarser > 1 and made.grid.mib <= 8
+    assert "as coarse" in caplog.text and "renderer.memory_mib=8 is less" in caplog.text
+
+
+def test_nothing_is_seen_of_nothing_and_what_is_dark_or_empty_is_not_asked():
+    nothing = scene_of(lambda points: torch.zeros_like(points[:, 0]))
+    found = render(nothing, rays_of(8), baked()).finest
+    assert bool((found.rgb == 1.0).all()) and bool((found.opacity == 0.0).all())
+    opaque = bake(scene_of(lambda points: 200.0 * (around(points) < RADIUS)), tolerance=0.05, memory_mib=256)
+    assert opaque.num_densities < 0.5 * opaque.num_points
