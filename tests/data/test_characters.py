@@ -16,6 +16,7 @@ from charnerf.data.characters import (
     remove_partial_characters,
     write_character,
 )
+from charnerf.data.layout import DatasetInfo, write_dataset
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import fibonacci_hemisphere, pixel_rays
 from charnerf.geometry.framing import framing_cameras, source_cameras
@@ -199,9 +200,16 @@ def test_wrong_pictures_are_named(character_folder):
         load_character(character_folder.parent, "hero")
 
 
-def test_a_missing_character_is_named(tmp_path):
-    with pytest.raises(DataError, match="no such folder, expected the character 'hero'"):
-        load_character(tmp_path, "hero")
+def test_a_missing_character_is_named_with_those_there_are_the_likest_first(tmp_path):
+    splits = {"train": tuple(f"a{number}" for number in range(20)), "test": ("robot",)}
+    write_dataset(DatasetInfo(root=tmp_path, splits=splits, made_by={}))
+    with pytest.raises(
+        DataError,
+        match=r"found no character 'robto', expected one of the data set's: robot, a0, .* and 9 more",
+    ):
+        load_character(tmp_path, "robto")
+    with pytest.raises(DataError, match="no such folder, expected the character 'robot'; capture it"):
+        load_character(tmp_path, "robot")
 
 
 def test_a_name_that_is_there_is_refused(character_folder):

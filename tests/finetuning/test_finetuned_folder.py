@@ -10,7 +10,9 @@ from PIL import Image
 import charnerf
 from charnerf.cli import run
 from charnerf.config.composition import compose_config
-from charnerf.finetuning import Recipe, finetune
+from charnerf.drawings.viewpoints import turnaround
+from charnerf.errors import DataError
+from charnerf.finetuning import Recipe, command, finetune
 from charnerf.finetuning.report import write_finetuned
 from charnerf.inference.build import build_model
 from charnerf.inference.model import Model
@@ -90,6 +92,32 @@ def test_the_command_writes_weights_that_reconstruct_can_use(model, person_views
     assert charnerf.load(tmp_path / "fitted").note is not None
     assert run(["finetune", *arguments, "--seconds", "0"]) == 2
     assert run(["finetune", *arguments[:3], "-o", drawings[0], "--seconds", "2"]) != 0
+
+
+def test_time_that_preparing_uses_up_is_an_error_and_writes_nothing(
+    model, person_views, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(
+        command, "refine", lambda *_, **__: finetune(model, hero, replace(QUICK, seconds=1e-6))
+    )
+    hero = model.encode_views(person_views)
+    drawings = dict(zip(("front", "side", "back"), _drawings(person_views, tmp_path), strict=True))
+    with pytest.raises(
+        DataError, match=r"--seconds: found 1, but preparing the drawings took .* s here and no step"
+    ):
+        command.finetune_drawings(
+            model, turnaround(**drawings), output=tmp_path / "out", seconds=1.0, say=lambda line: None
+        )
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_last_steps_are_looked_at_when_time_ends_between_looks(model, person_views):
+    done = finetune(
+        model,
+        model.encode_views(person_views),
+        replace(QUICK, seconds=0.4, check_every=10**6, most_steps=10**6),
+    )
+    assert len(done.curve) <= 2 and (len(done.curve) == 1 or done.curve[-1].step > 0)
 
 
 def test_reconstruct_refines_first_and_reports_it(model, person_views, tmp_path, capsys):

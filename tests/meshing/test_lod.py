@@ -1,6 +1,7 @@
 """Levels of detail of a sphere, whose figures are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,13 @@ def test_the_table_names_files_and_the_papers_values(lods):
     scene = scene_of(sphere, width=0.1)
     grid = build_lods(scene, None, MeshOptions(num_cameras=1), resolutions=(64,))
     assert "| 1822, 3640, 2 |" in lod_report(named(grid, "ball"))
+
+
+def test_numbers_go_to_levels_that_are_coarser_and_farther_off_than_the_one_before(lods):
+    finest, coarse_grid, decimated, least = lods
+    worse = replace(coarse_grid, chamfer_mm=decimated.chamfer_mm + 1.0)  # though it has more faces
+    names = named((finest, worse, decimated, least), "ball")
+    assert list(names) == ["ball_LOD0", "ball_LOD_grid32", "ball_LOD1", "ball_LOD2"]
 
 
 def test_no_grid_is_an_error():

@@ -23,7 +23,7 @@ def command(
     weights: Annotated[
         str | None,
         typer.Argument(
-            metavar="[RUN_OR_WEIGHTS]",
+            metavar="RUN_OR_WEIGHTS",
             help="A run folder, a .ckpt, a .safetensors, or `released`: its field is checked too.",
         ),
     ] = None,

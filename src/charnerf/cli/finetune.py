@@ -17,7 +17,10 @@ def command(
     output: Folder,
     weights: WeightsOption = None,
     seconds: Annotated[
-        float, typer.Option(min=1.0, help="Time for it; it ends earlier where nothing improves.")
+        float,
+        typer.Option(
+            min=1.0, help="Time for it, preparing included; it ends earlier where nothing improves."
+        ),
     ] = 30.0,
     device: Device = "auto",
     trust: Trusted = None,

@@ -1,5 +1,6 @@
 """One character of a data set: its pictures, cameras, source views and mesh, read and written."""
 
+import difflib
 import os
 import shutil
 from collections.abc import Callable, Sequence
@@ -11,13 +12,15 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from charnerf.data.layout import MESH_FILE, TRANSFORMS_FILE, check_name
+from charnerf.data.layout import MESH_FILE, TRANSFORMS_FILE, check_name, read_dataset
 from charnerf.data.transforms import read_transforms, transforms_text
 from charnerf.errors import DataError
 from charnerf.files import inside
 from charnerf.geometry.framing import SOURCE_ORDER
 from charnerf.pictures import open_picture
 from charnerf.types import Cameras, SourceViews
+
+MOST_NAMES = 12  # in a message
 
 DEPTH_FOLDER = "depth"
 _PARTIAL = ".partial-"
@@ -97,6 +100,21 @@ class CharacterPictures:
         return _source_views(torch.from_numpy(self.source_images), self.source_cameras.to(torch.float32))
 
 
+def _absent(root: Path, name: str) -> DataError:
+    """What to say of a character that is not there: names of the data set, those like it first."""
+    names = sorted({one for split in read_dataset(root).splits.values() for one in split})
+    if name in names:
+        return DataError(
+            f"{root / name}: no such folder, expected the character {name!r}; capture it or take it out of the split."
+        )
+    like = difflib.get_close_matches(name, names, n=3)
+    shown = [*like, *(one for one in names if one not in like)][:MOST_NAMES]
+    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    return DataError(
+        f"{root}: found no character {name!r}, expected one of the data set's: {', '.join(shown) or 'it has none'}{more}."
+    )
+
+
 def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Character:
     """Open a character of a data set.
 
@@ -113,10 +131,7 @@ def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Char
     check_name("character", name)
     folder = Path(root) / name
     if not folder.is_dir():
-        raise DataError(
-            f"{folder}: no such folder, expected the character {name!r}; capture it or take it out of "
-            f"the split."
-        )
+        raise _absent(Path(root), name)
     files = read_transforms(folder)
     if len(files.source_names) < num_sources:
         raise DataError(

@@ -271,7 +271,7 @@ def _disagreements(agreement: Reconciliation, figures: Sequence[_Figure]) -> lis
             lines.append(
                 f"{name}: its outline shares only {100 * view.iou_before:.0f} % with the mirrored"
                 f" {figures[view.partner].viewpoint.name}'s (IoU, expected {100 * LEAST_AGREEMENT:.0f} % or more): the drawings"
-                f" differ in pose or are not of one character"
+                f" differ in pose, are not of one character, or were given in another order than front, side, back"
                 + ("." if view.is_trusted else "; it could not be reconciled, colours may be misplaced.")
             )
         if np.isinf(view.tolerance).all():

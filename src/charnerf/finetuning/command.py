@@ -6,6 +6,7 @@ from pathlib import Path
 
 from charnerf.drawings.turnaround import Picture
 from charnerf.drawings.viewpoints import Viewpoint
+from charnerf.errors import DataError
 from charnerf.files import check_folder
 from charnerf.finetuning.finetune import CurvePoint, Finetuned, finetune
 from charnerf.finetuning.recipe import Recipe
@@ -42,7 +43,7 @@ def finetune_drawings(
         say: Gets what was assumed and what happened, sentence by sentence.
 
     Raises:
-        DataError: If a drawing can not be used, or the folder can not be written.
+        DataError: If a drawing can not be used, the folder can not be written, or the time ends before the first step.
     """
     check_folder(output)
     hero = model.encode_drawings(given)
@@ -52,6 +53,11 @@ def finetune_drawings(
         say(line)
     with Progress("fine-tune", {"fine-tune": seconds}, in_seconds=True) as progress:
         done = refine(model, hero, seconds, progress=progress)
+    if done.curve[-1].step == 0:
+        raise DataError(
+            f"--seconds: found {seconds:g}, but preparing the drawings took {done.seconds['prepare']:.0f} s here and no step was"
+            f" made, expected time to learn; nothing was written. Give --seconds {done.seconds['prepare'] + 30.0:.0f}."
+        )
     report = write_finetuned(done, output, recipe=replace(Recipe(), seconds=seconds), drawings=drawings)
     for line in summary_lines(done):
         say(line)

@@ -201,7 +201,7 @@ class _Run:
                 break
             optimizer.step()
             step += 1
-            if step % recipe.check_every:
+            if step % recipe.check_every and self._progress(step) < 1.0:
                 continue
             point = self._look(step, learnt)
             on_progress(self._progress(step), point)

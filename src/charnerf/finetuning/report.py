@@ -87,6 +87,11 @@ def summary_lines(done: Finetuned) -> list[str]:
     """What happened, sentences for a report or for the terminal."""
     shares = done.left_out.shares()
     step = done.curve[-1].step
+    if step == 0:
+        return [
+            f"No step was made: preparing the drawings took {done.seconds['prepare']:.0f} s, all of the time that was given. Give"
+            f" {done.seconds['prepare'] + 30.0:.0f} s."
+        ]
     return [
         done.reason,
         f"{step} steps in {sum(done.seconds.values()):.1f} s; the weights of step {done.best.step} are given back.",

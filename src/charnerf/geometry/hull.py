@@ -140,7 +140,8 @@ def _carve(
                 )
             raise DataError(
                 f"source views {missed}: found drawings whose silhouettes disagree by more than {WIDEST_DILATION:.0f} pixels, "
-                "expected views of one character at one height on one floor line. Align them, or set model.hull=false."
+                "expected views of one character at one height on one floor line, each from where it is named. Were the files given"
+                " in another order than front, side, back? Else align them, or set model.hull=false."
             )
         dilations = torch.where(dilations > 0, 2.0 * dilations, torch.ones_like(dilations))
         log.warning("Drawings disagree: the hull misses parts of source views %s; silhouettes widened to %.0f pixels.",

@@ -10,10 +10,20 @@ from charnerf.files import write_bytes
 from charnerf.meshing.exported import ExportedMesh, exported, welded
 from charnerf.meshing.gltf import encode_glb, encode_gltf
 from charnerf.meshing.obj import encode_obj
-from charnerf.meshing.usd import encode_usdz
+from charnerf.meshing.usd import check_usd, encode_usdz
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usdz")
 TEXTURED_SUFFIXES = (".glb", ".gltf", ".obj", ".usdz")
+
+
+def check_format(suffix: str) -> None:
+    """Check, before the work, that a format such as .usdz can be written here.
+
+    Raises:
+        DependencyError: If it needs a library that is missing.
+    """
+    if suffix == ".usdz":
+        check_usd()
 
 
 def save_mesh(mesh: trimesh.Trimesh, path: str | Path) -> Path:

@@ -117,8 +117,20 @@ def _distance(mesh: trimesh.Trimesh, finest: trimesh.Trimesh) -> float:
 
 
 def named(lods: Sequence[Lod], name: str) -> dict[str, Lod]:
-    """Levels by file name without suffix, as engines pair them: NAME_LOD0 is the finest."""
-    return {f"{name}_LOD{index}": lod for index, lod in enumerate(lods)}
+    """Levels by file name without suffix, as engines pair them: NAME_LOD0 is the finest, each after it coarser and farther off.
+
+    A level that another one of no more faces is nearer than is none of these: it is called by how it was made, such as
+    NAME_LOD_grid64.
+    """
+    files, number = {}, 0
+    for index, lod in enumerate(lods):
+        if any(other.chamfer_mm < lod.chamfer_mm for other in lods[index + 1 :]):
+            made = "" if lod.options.faces is None else f"_faces{lod.options.faces}"
+            files[f"{name}_LOD_grid{lod.options.resolution}{made}"] = lod
+        else:
+            files[f"{name}_LOD{number}"] = lod
+            number += 1
+    return files
 
 
 def lod_table(files: dict[str, Lod]) -> str:
@@ -148,7 +160,8 @@ def lod_report(files: dict[str, Lod]) -> str:
             "",
             "Chamfer: mean distance of the surface from the finest grid's and back. Evaluated: grid points of",
             "all that the field was asked for. Paper: Table I of CharNeRF, one character of its own; the Euler",
-            "number is what its counts give for a closed surface (2 for one without holes or floaters).",
+            "number is what its counts give for a closed surface (2 for one without holes or floaters). A level with a number is",
+            "coarser and farther from the finest than the one before; one called by its grid has more faces than a nearer one.",
             "",
         )
     )

@@ -11,6 +11,21 @@ from charnerf.meshing.exported import ExportedMesh
 from charnerf.surfaces.color import linear_from_srgb
 
 
+def check_usd() -> None:
+    """Check that USDZ can be written.
+
+    Raises:
+        DependencyError: If Pixar's library is missing.
+    """
+    try:
+        from pxr import Usd  # noqa: F401
+    except ImportError as error:
+        raise DependencyError(
+            f".usdz: Pixar's library is missing ({error}). Install it by `pip install 'charnerf[usd]'`, or "
+            "choose .glb."
+        ) from error
+
+
 def encode_usdz(exported: ExportedMesh) -> bytes:
     """One mesh as a USDZ package, its picture inside.
 
@@ -18,13 +33,9 @@ def encode_usdz(exported: ExportedMesh) -> bytes:
         DependencyError: If Pixar's library is missing.
         DataError: If the package could not be made.
     """
-    try:
-        from pxr import Sdf, Usd, UsdUtils
-    except ImportError as error:
-        raise DependencyError(
-            f".usdz: Pixar's library is missing ({error}). Install it by `pip install 'charnerf[usd]'`, or "
-            "choose .glb."
-        ) from error
+    check_usd()
+    from pxr import Sdf, Usd, UsdUtils
+
     with tempfile.TemporaryDirectory() as folder:
         layer = Path(folder) / "mesh.usdc"
         stage = Usd.Stage.CreateNew(str(layer))

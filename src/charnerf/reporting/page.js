@@ -10,11 +10,20 @@ function stack(layout) {
   if (panels.length < 2) return;
   panels.forEach((number, place) => {
     const top = 1 - place / panels.length;
-    layout[`xaxis${number}`] = { ...layout[`xaxis${number}`], domain: [0, 1] };
+    layout[`xaxis${number}`] = { ...layout[`xaxis${number}`], domain: [0, 1], anchor: `y${number}` };
     layout[`yaxis${number}`] = { ...layout[`yaxis${number}`], domain: [top - 0.68 / panels.length, top] };
   });
   layout.height = 300 * panels.length;
   layout.legend = { ...layout.legend, y: -0.22 / panels.length };
+}
+
+/** A color nearer to white, which stands out on dark paper. */
+const lighter = (hex) => `#${hex.match(/[0-9a-f]{2}/gi).map((one) => Math.round(0.6 * parseInt(one, 16) + 102).toString(16)).join("")}`;
+
+function inPaperColors(trace) {
+  if (!dark.matches) return trace;
+  const paint = (part) => part?.color && { ...part, color: lighter(part.color) };
+  return { ...trace, line: paint(trace.line) ?? trace.line, marker: paint(trace.marker) ?? trace.marker };
 }
 
 function drawPlots() {
@@ -29,7 +38,7 @@ function drawPlots() {
     const buttons = { bgcolor: color("--block"), bordercolor: color("--rule"), showactive: false }; // the axis says which
     layout.updatemenus = layout.updatemenus?.map((menu) => ({ ...menu, ...buttons }));
     if (narrow.matches) stack(layout);
-    Plotly.react(figure.querySelector("div"), plot.data, layout, { responsive: true, displaylogo: false });
+    Plotly.react(figure.querySelector("div"), plot.data.map(inPaperColors), layout, { responsive: true, displaylogo: false });
   }
 }
 
