@@ -16,6 +16,7 @@ import yaml
 from omegaconf import OmegaConf
 from PIL import Image
 
+from charnerf.cli import app as commands
 from charnerf.cli.app import app, run
 from charnerf.config import command_line
 from charnerf.config.composition import compose_config
@@ -55,7 +56,12 @@ def lines_of(page: Path) -> list[str]:
     return lines
 
 
-EVERY = [(page.name, line) for page in PAGES for line in lines_of(page)]
+EXAMPLES = [
+    (f"help of {name}", example)
+    for name in COMMANDS
+    for example in getattr(getattr(commands, name), "EXAMPLES", ())
+]
+EVERY = [*((page.name, line) for page in PAGES for line in lines_of(page)), *EXAMPLES]
 TRAINING = [line for _, line in EVERY if re.match(r"python train\.py|charnerf train", line)]
 SWEEPS = re.findall(
     r"`((?:experiment=|\S+=)[^`]*,[^`]*)`", (ROOT / "docs/results.md").read_text(encoding="utf-8")

@@ -5,6 +5,8 @@ A command's file imports what is heavy when the command runs, so that help and c
 
 import sys
 import traceback
+from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Annotated
 
 import typer
@@ -14,6 +16,7 @@ from charnerf.cli import (
     capture,
     check,
     draw,
+    env,
     evaluate,
     finetune,
     gallery,
@@ -24,7 +27,7 @@ from charnerf.cli import (
     search,
     train,
 )
-from charnerf.cli.messages import say
+from charnerf.cli.messages import quiet, say
 from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.interruption import Stopped, leave, listening
 from charnerf.process import limit_spinning
@@ -32,8 +35,14 @@ from charnerf.process import limit_spinning
 FAILED, WRONG_CALL = 1, 2
 DEBUG_NOTE = (
     "Exit status: 0 done, 1 failed, 2 wrong call. 130 stopped by Ctrl-C (SIGINT), 143 by SIGTERM."
-    " --debug shows the traceback of an error."
+    " --debug shows the traceback of an error, --quiet leaves out all but warnings and errors; both also after the command."
 )
+
+
+def _epilog(examples: Sequence[str]) -> str:
+    """What stands below a command's options: lines to type, which stay as they are, and the statuses."""
+    return "\b\nExamples:\n" + "".join(f"  {example}\n" for example in examples) + f"\n{DEBUG_NOTE}"
+
 
 app = typer.Typer(
     name="charnerf",
@@ -57,14 +66,18 @@ for module in (
     bench,
     check,
     search,
+    env,
 ):
-    app.command(module.__name__.rpartition(".")[2], epilog=DEBUG_NOTE)(module.command)
+    app.command(module.__name__.rpartition(".")[2], epilog=_epilog(module.EXAMPLES))(module.command)
 
 
 @app.callback()
 def _options(
     debug: Annotated[
         bool, typer.Option("--debug", help="Show the traceback of an error; also after the command.")
+    ] = False,
+    is_quiet: Annotated[
+        bool, typer.Option("--quiet", help="Say nothing but warnings and errors; also after the command.")
     ] = False,
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, help="Print the version and exit.")
@@ -84,17 +97,24 @@ def _printable(text: str) -> str:
     return "".join(one if one.isprintable() or one in "\n\t" else ascii(one)[1:-1] for one in text)
 
 
+def _taken(arguments: list[str], *flags: str) -> tuple[list[bool], list[str]]:
+    """Which flags stand anywhere before a `--`, and the arguments without them; what comes after may be files of these names."""
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    options = arguments[:end]
+    rest = [one for one in options if one not in flags]
+    return [flag in options for flag in flags], [*rest, *arguments[end:]]
+
+
 def run(arguments: list[str]) -> int:
     """Run a command line and return its exit status."""
-    debug = "--debug" in arguments
-    arguments = [one for one in arguments if one != "--debug"]
+    (debug, is_quiet), arguments = _taken(arguments, "--debug", "--quiet")
     if "--version" in arguments[:1]:
         from charnerf import __version__
 
         typer.echo(f"charnerf {__version__}")
         return 0
     try:
-        with listening():
+        with listening(), quiet() if is_quiet else nullcontext():
             app(
                 arguments, prog_name="charnerf", obj=debug
             )  # leaves by SystemExit, also for wrong options (2)

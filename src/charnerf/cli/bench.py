@@ -10,6 +10,8 @@ from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Device, SomeDataset, Trusted, Weights
 
+EXAMPLES = ("charnerf bench --quick", "charnerf bench outputs/run --data characters --json bench.json")
+
 
 def command(
     weights: Weights = None,

@@ -1,5 +1,6 @@
 """`charnerf capture`: meshes to a data set."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -7,11 +8,18 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.options import Depth, Jobs, NewDataset, Size, Sources, Views
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, typed
 from charnerf.errors import DataError
 from charnerf.wording import counted
 
 if TYPE_CHECKING:
     from charnerf.capture.dataset import CaptureReport
+
+EXAMPLES = (
+    "charnerf capture meshes/ -o characters --split train",
+    "charnerf capture anna.glb -o characters --split val --views 24",
+    "charnerf capture meshes/ -o more --split train --variants 4 --swaps 2",
+)
 
 Meshes = Annotated[
     list[Path],
@@ -71,6 +79,7 @@ def command(
     drawn: Drawn = 0,
     seed: Seed = 0,
     jobs: Jobs = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
 
@@ -83,6 +92,8 @@ def command(
     from charnerf.capture.lights import Headlight, Unlit
     from charnerf.drawings.redrawn import with_drawn_sources
 
+    began = time.perf_counter()
+    check_json(json_file)
     shown = Unlit() if light == "unlit" else Headlight()
     done = capture_dataset(
         meshes,
@@ -98,10 +109,10 @@ def command(
         up=up,
         facing=facing,
     )
-    _report(done, output, split)
+    _report(done, output, split, began, json_file)
 
 
-def _report(done: "CaptureReport", output: Path, split: str) -> None:
+def _report(done: "CaptureReport", output: Path, split: str, began: float, json_file: Path | None) -> None:
     """Say what was captured, and fail where something was not."""
     from charnerf.data.digest import split_digest
 
@@ -109,9 +120,20 @@ def _report(done: "CaptureReport", output: Path, split: str) -> None:
         say(
             f"{counted(len(done.skipped), 'character')} skipped: there from the same capture, which was interrupted."
         )
-    say(f"{counted(len(done.captured), 'character')} captured into {output}, split {split}.")
-    if done.captured or done.skipped:
-        say(f"{split}: digest {split_digest(output, split)}")
+    made = f"{counted(len(done.captured), 'character')} captured into split {split}"
+    names = [*done.captured, *done.skipped]
+    digest = split_digest(output, split) if names else None
+    next_ = [typed("mesh", "--data", output, "--character", names[0], "-o", "meshes")] if names else []
+    next_ += [typed("train", "data=folder", f"data.root={output}")] if split == "train" and names else []
+    facts = {
+        "captured": done.captured,
+        "skipped": done.skipped,
+        "failed": done.failed,
+        "split": split,
+        "digest": digest,
+    }
+    told = "" if digest is None else f"digest of {split}, the same wherever the data are the same: {digest}"
+    close(Summary(made=made, files=(output,), began=began, quality=told, next_=next_, facts=facts), json_file)
     if done.failed:
         raise DataError(
             f"{counted(len(done.failed), 'mesh', 'meshes')} could not be captured:\n  "

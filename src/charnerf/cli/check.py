@@ -1,19 +1,25 @@
 """`charnerf check`: numerical kernels, and a trained field, on stiff and extreme cases."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from charnerf.cli.messages import say
 from charnerf.cli.model import load_model, pick_device
 from charnerf.cli.options import Device, SomeDataset, Trusted
+from charnerf.cli.summary import JsonFile, Summary, check_json, close
 from charnerf.errors import DataError
 
 if TYPE_CHECKING:
     from charnerf.inference.model import Model
     from charnerf.types import Cameras, SourceViews
 
+EXAMPLES = (
+    "charnerf check",
+    "charnerf check released -o checked",
+    "charnerf check outputs/run --data characters",
+)
 BROKEN = 1  # exit status
 CHECKED_SIZE = 48  # pixels: each one is a ray of its own
 CHECKED_SEED = 20  # of the embedded character that a field is checked with
@@ -38,6 +44,7 @@ def command(
     ] = None,
     device: Device = "auto",
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Measure every numerical kernel, and a trained field, on stiff and extreme cases.
 
@@ -47,6 +54,8 @@ def command(
     from charnerf.files import check_folder
     from charnerf.stability import TrainedField, run_check
 
+    began = time.perf_counter()
+    check_json(json_file)
     check_folder(output)
     trained = None
     if weights is not None:
@@ -58,7 +67,12 @@ def command(
     result.to_json(output / "check.json")
     result.plot(output / "check.png")
     typer.echo(result.table())
-    say(f"{output / 'check.json'}, {output / 'check.png'}: {'passed' if result.passed else 'BROKEN'}.")
+    files = (output / "check.json", output / "check.png")
+    told = "passed" if result.passed else "BROKEN"
+    facts = {"passed": result.passed}
+    close(
+        Summary(made="a check of the kernels", files=files, began=began, quality=told, facts=facts), json_file
+    )
     if not result.passed:
         raise typer.Exit(BROKEN)
 

@@ -1,12 +1,17 @@
 """`charnerf draw`: drawings of characters whose shape is known."""
 
+import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from charnerf.cli.dataset import GivenDataset, dataset_options
-from charnerf.cli.messages import say
 from charnerf.cli.options import Folder, gathered
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, typed
+from charnerf.wording import counted
+
+EXAMPLES = ("charnerf draw --data characters --character anna -o drawings --level 2",)
 
 
 @gathered(data=dataset_options)
@@ -27,6 +32,7 @@ def command(
             help="How far views disagree: 0 as captured, 1 in place and size, 2 limbs off by 10 degrees, 3 by 30 degrees.",
         ),
     ] = 1,
+    json_file: JsonFile = None,
 ) -> None:
     """Draw characters of a data set as somebody would: DIR/front.png, side.png, back.png; DIR/NAME/ for several.
 
@@ -37,10 +43,14 @@ def command(
     from charnerf.drawings.artist import draw_character, write_drawings
     from charnerf.files import check_folder
 
+    began = time.perf_counter()
+    check_json(json_file)
     check_folder(output)
     root = data.opened()
     drawn = [load_character(root, name) for name in character]
+    files: list[Path] = []
     for one in drawn:
         folder = output / one.name if len(drawn) > 1 else output
-        files = write_drawings(draw_character(one, size=size, seed=seed, level=level), folder)
-        say(", ".join(str(file) for file in files))
+        files += write_drawings(draw_character(one, size=size, seed=seed, level=level), folder)
+    next_ = (typed("reconstruct", *files[:3], "-o", "hero"),)
+    close(Summary(made=counted(len(files), "drawing"), files=files, began=began, next_=next_), json_file)

@@ -21,6 +21,10 @@ from charnerf.meshing.options import MeshOptions
 if TYPE_CHECKING:
     from charnerf.data.characters import Character
 
+EXAMPLES = (
+    "charnerf evaluate --data characters --split test",
+    "charnerf evaluate outputs/run --data characters --split test --json metrics.json -o measured",
+)
 MOST_VIEWS = 100_000
 FIXED_VIEWS = 24  # a character, by weights that lie in no run's folder
 NumViews = Annotated[

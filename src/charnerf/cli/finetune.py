@@ -1,5 +1,7 @@
 """`charnerf finetune`: weights adapted to one character's drawings."""
 
+import shlex
+import time
 from typing import Annotated
 
 import typer
@@ -8,6 +10,13 @@ from charnerf.cli.drawings import GivenDrawings, drawings_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Device, Folder, Trusted, WeightsOption, gathered
+from charnerf.cli.summary import JsonFile, Summary, check_json, close
+from charnerf.wording import counted
+
+EXAMPLES = (
+    "charnerf finetune front.png side.png back.png -o fitted",
+    "charnerf finetune front.png side.png back.png -o fitted --seconds 60 --weights outputs/run",
+)
 
 
 @gathered(given=drawings_options)
@@ -24,6 +33,7 @@ def command(
     ] = 30.0,
     device: Device = "auto",
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Adapt weights to one character's drawings: DIR/weights.safetensors, curve and report.
 
@@ -33,5 +43,21 @@ def command(
     """
     from charnerf.finetuning.command import finetune_drawings
 
+    began = time.perf_counter()
+    check_json(json_file)
     model = load_model(weights, device=device, trust=trust)
-    finetune_drawings(model, given.drawings, output=output, seconds=seconds, say=say)
+    done = finetune_drawings(model, given.drawings, output=output, seconds=seconds, say=say)
+    first, best = done.curve[0], done.best
+    close(
+        Summary(
+            made=f"weights adapted by {counted(best.step, 'step')}"
+            if done.kept
+            else "the starting weights again",
+            files=(output / "report.html", output / "weights.safetensors"),
+            began=began,
+            quality=f"held-out patches {first.held_out_psnr:.1f} dB before, {best.held_out_psnr:.1f} dB now. {done.reason}",
+            next_=(f"charnerf reconstruct FRONT SIDE BACK {shlex.join(['--weights', str(output)])} -o DIR",),
+            facts={"kept": done.kept, "steps": done.curve[-1].step, "held_out_psnr": best.held_out_psnr},
+        ),
+        json_file,
+    )

@@ -1,14 +1,19 @@
 """`charnerf generate`: the embedded characters as a data set."""
 
+import time
 from typing import Annotated
 
 import typer
 
-from charnerf.cli.messages import say
 from charnerf.cli.options import Jobs, NewDataset, Size, Views
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, typed
 from charnerf.errors import ConfigError
 from charnerf.wording import counted
 
+EXAMPLES = (
+    "charnerf generate -o embedded --train 32 --val 4 --test 6",
+    "charnerf generate -o few --train 2 --val 1 --test 1",
+)
 MOST = 1_000_000  # characters of a split
 
 
@@ -22,6 +27,7 @@ def command(
     views: Views = 48,
     size: Size = 128,
     jobs: Jobs = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Write the embedded characters of `data=procedural` as a data set."""
     from charnerf.capture.procedural_data import generate_dataset
@@ -31,9 +37,24 @@ def command(
 
     if train + val + test == 0:
         raise ConfigError("--train, --val, --test: found 0 each, expected at least one character.")
+    began = time.perf_counter()
+    check_json(json_file)
     check_folder(output)
     generate_dataset(output, train, val, test, seed, views=views, size=size, processes=jobs)
-    say(f"{counted(train + val + test, 'character is', 'characters are')} in {output}.")
-    for split, members in read_dataset(output).splits.items():
-        if members:
-            say(f"{split}: {counted(len(members), 'character')}, digest {split_digest(output, split)}")
+    splits = read_dataset(output).splits
+    close(
+        Summary(
+            made=f"{counted(train + val + test, 'embedded character')}",
+            files=(output,),
+            began=began,
+            next_=(typed("train", "data=folder", f"data.root={output}"),) if train and val and test else (),
+            facts={
+                "splits": {
+                    split: {"characters": len(members), "digest": split_digest(output, split)}
+                    for split, members in splits.items()
+                    if members
+                }
+            },
+        ),
+        json_file,
+    )

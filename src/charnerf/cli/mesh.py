@@ -1,8 +1,9 @@
 """`charnerf mesh`: the mesh of a character of a data set, its levels of detail, or a split's meshes measured."""
 
 import json
+import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -21,14 +22,22 @@ from charnerf.cli.options import (
     is_count,
     mesh_options,
 )
+from charnerf.cli.summary import JsonFile, Summary, check_json, close
 from charnerf.files import check_folder
-from charnerf.meshing.options import MeshOptions
+from charnerf.meshing.options import MeshOptions, Texture
+from charnerf.reconstruction.options import LIGHT
+from charnerf.wording import counted
 
 if TYPE_CHECKING:
     from charnerf.data.characters import Character
     from charnerf.inference.hero import Hero
+    from charnerf.reconstruction.meshes import MeshFiles
 
-MEASURED_FACES = 8000  # of a split's meshes, unless --faces says otherwise
+EXAMPLES = (
+    "charnerf mesh --data characters --character anna -o out",
+    "charnerf mesh outputs/run --data characters --character anna -o out --lod 64,128 --faces 2000,8000",
+    "charnerf mesh --data characters --split test -o out",
+)
 
 
 Name = Annotated[
@@ -49,8 +58,9 @@ Grids = Annotated[
 Faces = Annotated[
     str | None,
     typer.Option(
-        metavar="N[,N..]",
-        help="Faces after decimation; all if left out. With several numbers, or with --lod, further meshes.",
+        metavar="N[,N..]|all",
+        help=f"Faces after decimation, or all; {LIGHT.faces} if left out, with --lod none. With several numbers, or with --lod,"
+        " further meshes.",
     ),
 ]
 Convergence = Annotated[
@@ -66,7 +76,48 @@ Format = Annotated[
 ]
 
 
-@gathered(data=dataset_options, mesh=mesh_options(MeshOptions()))
+SomeColors = Annotated[
+    Texture | None,
+    typer.Option(
+        "--texture",
+        help="Colours, as of reconstruct: a texture from the drawings, by the field, or at vertices; drawings if left out, vertex"
+        " where all faces are kept or the format carries no texture.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which meshes are made of a character.
+
+    Attributes:
+        grids: Of levels of detail; empty where one grid is enough.
+        counts: Faces that are asked for.
+        first: Faces of a single mesh; None keeps all.
+    """
+
+    grids: tuple[int, ...]
+    counts: tuple[int, ...]
+    first: int | None
+
+    @property
+    def has_levels(self) -> bool:
+        """Whether there are several meshes."""
+        return bool(self.grids) or len(self.counts) > 1
+
+
+def plan_options(*, lod: Grids = None, faces: Faces = None) -> Plan:
+    """What --lod and --faces ask for."""
+    grids = _numbers(lod, "--lod", least=16)
+    if faces == "all":
+        return Plan(grids, (), None)
+    counts = _numbers(faces, "--faces", least=4)
+    if len(counts) > 1 or grids:
+        return Plan(grids, counts, None)
+    return Plan(grids, counts, counts[0] if counts else LIGHT.faces)
+
+
+@gathered(data=dataset_options, mesh=mesh_options(MeshOptions()), plan=plan_options)
 def command(
     *,
     data: GivenDataset,
@@ -75,13 +126,14 @@ def command(
     split: Split = None,
     weights: Weights = None,
     mesh: MeshOptions,
-    lod: Grids = None,
-    faces: Faces = None,
+    plan: Plan,
+    texture: SomeColors = None,
     convergence: Convergence = False,
     symmetric: Symmetric = False,
     suffix: Format = "glb",
     device: Device = "auto",
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Make the mesh of a character of a data set: DIR/NAME.glb, metres, and a contact sheet.
 
@@ -90,33 +142,63 @@ def command(
     """
     if (character is None) == (split is None):
         raise typer.BadParameter("expected one of the two.", param_hint="--character, --split")
-    from charnerf.meshing.lod import lod_table
-    from charnerf.reconstruction.meshes import write_convergence, write_lods, write_mesh
+    from charnerf.meshing.export import check_format
 
-    grids, counts = _numbers(lod, "--lod", least=16), _numbers(faces, "--faces", least=4)
-    options = replace(
-        mesh, resolution=grids[0] if grids else mesh.resolution, faces=counts[0] if counts else None
-    )
+    began = time.perf_counter()
+    check_format(f".{suffix}")
+    check_json(json_file)
     check_folder(output)
+    options = _options(mesh, plan, texture, suffix)
     heroes = _heroes(data.opened(), character, split, symmetric, weights, device=device, trust=trust)
     if split is not None:
         _measure(heroes, options, output, split)
+    written: list[Path] = []
     for one, hero in heroes:
         folder = output if split is None else output / one.name
-        if lod is None and len(counts) <= 1:
-            files = write_mesh(hero, one.name, folder, options, suffix=suffix)
-        else:
-            grids = grids or (mesh.resolution,)
-            files = write_lods(
-                hero, one.name, folder, options, resolutions=grids, faces=counts, suffix=suffix
-            )
-        notes = files.notes
-        if convergence:
-            notes += write_convergence(hero, one.name, folder, files.built)
+        files = _write(hero, one.name, folder, options, plan, suffix)
+        notes = files.notes + (_converged(hero, one.name, folder, files) if convergence else ())
         for line in notes if split is None else notes[:1]:
             say(line)
-        if split is None and files.lods:
-            typer.echo(lod_table(files.lods))
+        written += [*files.meshes, files.sheet]
+    close(
+        Summary(
+            made=counted(len(heroes), "character's mesh", "characters' meshes"), files=written, began=began
+        ),
+        json_file,
+    )
+
+
+def _options(mesh: MeshOptions, plan: Plan, texture: Texture | None, suffix: str) -> MeshOptions:
+    """How a single mesh, or the first level, is made."""
+    from charnerf.meshing.export import TEXTURED_SUFFIXES
+
+    if texture is None:
+        has_texture = plan.first is not None and f".{suffix}" in TEXTURED_SUFFIXES
+        texture = LIGHT.texture if has_texture else "vertex"
+    resolution = plan.grids[0] if plan.grids else mesh.resolution
+    return replace(mesh, resolution=resolution, faces=plan.first, texture=texture)
+
+
+def _write(
+    hero: "Hero", name: str, folder: Path, options: MeshOptions, plan: Plan, suffix: str
+) -> "MeshFiles":
+    """Write a mesh, or levels of detail with their table, which is printed."""
+    from charnerf.meshing.lod import lod_table
+    from charnerf.reconstruction.meshes import write_lods, write_mesh
+
+    if not plan.has_levels:
+        return write_mesh(hero, name, folder, options, suffix=suffix)
+    grids = plan.grids or (options.resolution,)
+    files = write_lods(hero, name, folder, options, resolutions=grids, faces=plan.counts, suffix=suffix)
+    typer.echo(lod_table(files.lods))
+    return files
+
+
+def _converged(hero: "Hero", name: str, folder: Path, files: "MeshFiles") -> tuple[str, ...]:
+    """Lines of how many cameras a mesh needs."""
+    from charnerf.reconstruction.meshes import write_convergence
+
+    return write_convergence(hero, name, folder, files.built)
 
 
 def _heroes(
@@ -164,7 +246,7 @@ def _measure(
     from charnerf.evaluation.timing import process_peak_mib
     from charnerf.files import write_text
 
-    options = replace(options, faces=options.faces or MEASURED_FACES)
+    options = replace(options, faces=options.faces or LIGHT.faces)
     rows = {}
     for character, hero in heroes:
         rows[character.name] = score_meshes(hero.scene, character, options)

@@ -141,7 +141,6 @@ def mesh_options(default: MeshOptions) -> Callable[..., MeshOptions]:
         cameras: Cameras = default.num_cameras,
         smooth: Smooth = default.smooth,
         height: Height = default.height,
-        texture: Colors = default.texture,
         texture_size: TextureSize = default.texture_size,
     ) -> MeshOptions:
         return replace(
@@ -150,7 +149,6 @@ def mesh_options(default: MeshOptions) -> Callable[..., MeshOptions]:
             num_cameras=cameras,
             smooth=smooth,
             height=height,
-            texture=texture,
             texture_size=texture_size,
         )
 

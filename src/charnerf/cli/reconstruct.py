@@ -1,7 +1,8 @@
 """`charnerf reconstruct`: drawings or a sheet to a mesh, a turntable, views and a report."""
 
+import time
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,6 +10,7 @@ from charnerf.cli.drawings import GivenDrawings, drawings_options, reading_optio
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import (
+    Colors,
     Device,
     Folder,
     Size,
@@ -18,9 +20,20 @@ from charnerf.cli.options import (
     gathered,
     mesh_options,
 )
+from charnerf.cli.summary import JsonFile, Summary, check_json, close
 from charnerf.drawings.options import ReadingOptions
 from charnerf.meshing.options import MeshOptions
 from charnerf.reconstruction.options import LIGHT, ReconstructionOptions
+from charnerf.wording import counted
+
+if TYPE_CHECKING:
+    from charnerf.reconstruction.folder import Reconstruction
+
+EXAMPLES = (
+    "charnerf reconstruct front.png side.png back.png -o hero",
+    "charnerf reconstruct sheet.png -o hero --order front,side,back",
+    "charnerf reconstruct front.png side.png --view 45=quarter.png -o hero --refine 30 --symmetric",
+)
 
 
 @gathered(given=drawings_options, reading=reading_options, mesh=mesh_options(LIGHT))
@@ -32,6 +45,7 @@ def command(
     weights: WeightsOption = None,
     mesh: MeshOptions,
     faces: Annotated[int | None, typer.Option(help="Faces of the mesh after decimation.")] = LIGHT.faces,
+    texture: Colors = LIGHT.texture,
     symmetric: Symmetric = ReconstructionOptions.symmetric,
     frames: Annotated[
         int, typer.Option(min=1, help="Frames of the turntable.")
@@ -47,6 +61,7 @@ def command(
     ] = ReconstructionOptions.refine_seconds,
     device: Device = "auto",
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Turn drawings, or a sheet, into DIR/mesh.glb, DIR/turntable.mp4 (or .gif), views and DIR/report.html.
 
@@ -54,9 +69,27 @@ def command(
     height and floor line, and where views disagree the later ones are moved to the earlier ones. What was assumed
     is printed, and drawn in the report.
     """
-    options = ReconstructionOptions(replace(mesh, faces=faces), frames, size, symmetric, refine)
+    began = time.perf_counter()
+    check_json(json_file)
+    options = ReconstructionOptions(
+        replace(mesh, faces=faces, texture=texture), frames, size, symmetric, refine
+    )
     from charnerf.reconstruction.folder import reconstruct
 
     model = load_model(weights, device=device, trust=trust)
     done = reconstruct(model, output, options, given.drawings, reading=reading, sheet=given.sheet, say=say)
-    say(f"{done.mesh}, {done.turntable}, {done.report}: {sum(done.seconds.values()):.0f} s.")
+    close(_summary(done, frames, began), json_file)
+
+
+def _summary(done: "Reconstruction", frames: int, began: float) -> Summary:
+    """What was made and how good it is."""
+    from charnerf.reconstruction.quality import quality_words
+
+    return Summary(
+        made=f"a mesh of {counted(len(done.built.mesh.faces), 'face')}, a turntable of {counted(frames, 'frame')}",
+        files=(done.report, done.mesh, done.turntable),
+        began=began,
+        quality=quality_words(done.quality),
+        try_=done.suggestions,
+        facts=done.facts,
+    )

@@ -1,12 +1,15 @@
 """`charnerf report`: the report of a run, or over all runs below a folder."""
 
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from charnerf.cli.messages import say
 from charnerf.cli.options import Trusted
+from charnerf.cli.summary import JsonFile, Summary, check_json, close
+
+EXAMPLES = ("charnerf report outputs/run", "charnerf report outputs --drawings drawings/")
 
 
 def command(
@@ -25,6 +28,7 @@ def command(
         ),
     ] = None,
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Write FOLDER/report.md and FOLDER/report.html: of a run, or over all runs below a folder.
 
@@ -32,4 +36,7 @@ def command(
     """
     from charnerf.reporting.folder_report import report
 
-    say(f"report: {report(folder, drawings=drawings, trusted=trust or ())}")
+    began = time.perf_counter()
+    check_json(json_file)
+    file = report(folder, drawings=drawings, trusted=trust or ())
+    close(Summary(made="a report", files=(file.with_suffix(".html"), file), began=began), json_file)

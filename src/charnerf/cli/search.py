@@ -16,6 +16,8 @@ Overrides = Annotated[
     ),
 ]
 
+EXAMPLES = ("charnerf search encoder=single,double 'scale.width=32,64,128' -o outputs/search --trials 30",)
+
 
 def command(
     overrides: Overrides,

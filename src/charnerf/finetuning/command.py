@@ -58,8 +58,7 @@ def finetune_drawings(
             f"--seconds: found {seconds:g}, but preparing the drawings took {done.seconds['prepare']:.0f} s here and no step was"
             f" made, expected time to learn; nothing was written. Give --seconds {done.seconds['prepare'] + 30.0:.0f}."
         )
-    report = write_finetuned(done, output, recipe=replace(Recipe(), seconds=seconds), drawings=drawings)
+    write_finetuned(done, output, recipe=replace(Recipe(), seconds=seconds), drawings=drawings)
     for line in summary_lines(done):
         say(line)
-    say(f"{output / 'weights.safetensors'}, {report}")
     return done
