@@ -9,8 +9,8 @@ import torch
 from PIL import Image
 from scipy import ndimage
 
-from charnerf.foreign.frame import Similarity
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
+from charnerf.geometry.similarity import Similarity
 from charnerf.types import Cameras
 from support.figures import CENTRE, figure, photograph
 

@@ -10,10 +10,11 @@ from torch import Tensor
 from charnerf.data.characters import CharacterPictures
 from charnerf.errors import DataError
 from charnerf.foreign.axes import upright
-from charnerf.foreign.frame import Similarity, azimuth_turn, level_direction, standing
+from charnerf.foreign.frame import azimuth_turn, level_direction, standing
 from charnerf.foreign.reading import Reading
 from charnerf.foreign.shot import Shot, on_canvas
 from charnerf.geometry.framing import SOURCE_AZIMUTHS
+from charnerf.geometry.similarity import Similarity
 from charnerf.types import Cameras
 
 log = logging.getLogger(__name__)
