@@ -15,6 +15,7 @@ from charnerf.cli import (
     bench,
     capture,
     check,
+    doctor,
     draw,
     env,
     evaluate,
@@ -65,6 +66,7 @@ for module in (
     draw,
     bench,
     check,
+    doctor,
     search,
     env,
 ):

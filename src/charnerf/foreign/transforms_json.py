@@ -76,7 +76,7 @@ class TransformsJson(AbstractFormat):
 
     def characters(self, root: Path) -> list[Found]:
         """The folder itself, or those in it."""
-        if _files(root):
+        if camera_files(root):
             return found_in([root])
         split_folders = [root / split for split in SPLITS if (root / split).is_dir()]
         if split_folders:
@@ -87,7 +87,7 @@ class TransformsJson(AbstractFormat):
         """Frames of all files; one picture counts once."""
         shots: dict[Path, Shot] = {}
         unknown: set[str] = set()
-        for path in _files(one.folder):
+        for path in camera_files(one.folder):
             content = read_json(inside(one.folder, path.name, str(one.folder)))
             frames = content.get("frames")
             if not isinstance(frames, list) or not 1 <= len(frames) <= MOST_FRAMES:
@@ -107,8 +107,8 @@ class TransformsJson(AbstractFormat):
         return list(shots.values())
 
 
-def _files(folder: Path) -> list[Path]:
-    """The transforms*.json of a folder, in their order."""
+def camera_files(folder: Path) -> list[Path]:
+    """The transforms*.json of a folder, in the order that views are counted."""
     order = {
         f"transforms{suffix}.json": place for place, suffix in enumerate(("", "_train", "_val", "_test"))
     }
@@ -117,7 +117,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _with_files(folder: Path) -> list[Path]:
-    return [one for one in folders_in(folder) if _files(one)]
+    return [one for one in folders_in(folder) if camera_files(one)]
 
 
 def _shot(folder: Path, where: str, frame: dict[str, Any]) -> Shot:

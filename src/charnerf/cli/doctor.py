@@ -1,0 +1,107 @@
+"""`charnerf doctor`: what is wrong with a data set, drawings or a run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from charnerf.cli.messages import say
+from charnerf.cli.options import Jobs, Trusted
+from charnerf.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from charnerf.doctor.finding import Finding
+
+EXAMPLES = (
+    "charnerf doctor characters",
+    "charnerf doctor front.png side.png back.png",
+    "charnerf doctor outputs/run/<date>",
+)
+BROKEN = 1  # exit status
+SHOWN = 20  # findings on the terminal
+Subject = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="DATASET | RUN | FRONT SIDE [BACK] | DRAWINGS",
+        exists=True,
+        help="A data set, ours or a foreign one; a run folder; drawings, or a folder with front.png, side.png, back.png.",
+    ),
+]
+
+
+def command(
+    subject: Subject,
+    *,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="DIR", file_okay=False, help="For doctor.html and doctor.json."
+        ),
+    ] = Path("outputs/doctor"),
+    jobs: Jobs = None,
+    trust: Trusted = None,
+) -> None:
+    """Find what is wrong with a data set, drawings or a run; each fault with its evidence, the fix and a command.
+
+    Silhouettes are carved into a hull and seen again by every camera, and so is the mesh. Exit status 1 if
+    anything is broken.
+    """
+    from charnerf.doctor.report import verdict, write_findings
+    from charnerf.files import check_folder
+
+    check_folder(output)
+    findings = list(_findings(subject, jobs, tuple(trust or ())))
+    page = write_findings(output, " ".join(map(str, subject)), findings)
+    for one in findings[:SHOWN]:
+        typer.echo(one.line())
+        if one.command:
+            typer.echo(f"    {one.command}")
+    if len(findings) > SHOWN:
+        typer.echo(f"... and {len(findings) - SHOWN} more.")
+    typer.echo(verdict(findings))
+    say(str(page))
+    if any(one.is_broken for one in findings):
+        raise typer.Exit(BROKEN)
+
+
+def _findings(subject: list[Path], jobs: int | None, trusted: tuple[str, ...]) -> "Iterator[Finding]":
+    """What is wrong with what was given, by what it is."""
+    from tqdm import tqdm
+
+    from charnerf.doctor.characters import dataset_findings
+    from charnerf.doctor.drawings import drawing_findings, drawings_in
+    from charnerf.doctor.run import is_run, run_findings
+
+    first = subject[0]
+    if len(subject) > 1 or first.is_file():
+        yield from drawing_findings(_by_view(subject))
+    elif is_run(first):
+        yield from run_findings(first, trusted=trusted)
+    elif drawings := drawings_in(first):
+        yield from drawing_findings(_named(drawings))
+    else:
+        with tqdm(total=0, desc="examine", unit="character", delay=1.0) as bar:
+
+            def examined(total: int) -> None:
+                bar.total = total or bar.total
+                bar.update(0 if total else 1)
+
+            yield from dataset_findings(first, processes=jobs, examined=examined)
+
+
+def _by_view(files: list[Path]):  # type: ignore[no-untyped-def]
+    """FRONT SIDE [BACK], or the figures of one sheet."""
+    from charnerf.cli.drawings import given_drawings
+
+    if any(not one.is_file() for one in files):
+        raise ConfigError(f"{' '.join(map(str, files))}: found folders among files, expected drawings alone.")
+    return given_drawings(files, None, side_shows="left", order=None, figures=None, say=say).drawings
+
+
+def _named(drawings: dict[str, Path]):  # type: ignore[no-untyped-def]
+    """Drawings by the views of their names; side is the left one."""
+    from charnerf.drawings.viewpoints import viewpoint
+
+    return {viewpoint("left" if name == "side" else name): file for name, file in drawings.items()}

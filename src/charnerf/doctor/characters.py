@@ -1,0 +1,172 @@
+"""A data set's characters examined, one by one: files, figures, cameras, mesh."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from charnerf.capture.parallel import in_processes
+from charnerf.data.characters import DEPTH_FOLDER
+from charnerf.data.layout import DATASET_FILE, MESH_FILE, TRANSFORMS_FILE, read_dataset
+from charnerf.doctor.camera_file import read_camera_file
+from charnerf.doctor.figure import figure_alpha, figure_findings
+from charnerf.doctor.finding import Finding
+from charnerf.doctor.geometry import geometry_findings
+from charnerf.doctor.picture_files import depth_findings, duplicates, picture_findings
+from charnerf.doctor.seen import seen
+from charnerf.doctor.surface import mesh_findings
+from charnerf.doctor.views import Patient, View
+from charnerf.errors import DataError
+from charnerf.foreign.base import AbstractFormat, Found
+from charnerf.foreign.kept import is_ours, recognised
+from charnerf.foreign.transforms_json import TransformsJson, camera_files
+
+MOST_PIXELS_HELD = 600_000_000  # of a character's pictures at once
+
+
+def dataset_findings(
+    root: Path, *, processes: int | None, examined: Callable[[int], object]
+) -> Iterator[Finding]:
+    """What is wrong with a data set, ours or foreign.
+
+    Args:
+        root: Its folder.
+        processes: Worker processes; None for one a core.
+        examined: Told how many characters there are, and then of each 0.
+
+    Raises:
+        DataError: If it is no data set at all.
+    """
+    if is_ours(root):
+        try:
+            splits = read_dataset(root).splits
+        except DataError as error:
+            yield Finding(
+                "broken list", str(root / DATASET_FILE), str(error), "a list of splits", "Write it again."
+            )
+            return
+        names = list(dict.fromkeys(name for members in splits.values() for name in members))
+        patients = [partial(_of_ours, root, name) for name in names]
+    else:
+        form, found = recognised(root)
+        patients = [partial(_of_foreign, form, one) for one in found]
+    examined(len(patients))
+    for _, findings in in_processes(_examine, patients, processes):
+        examined(0)
+        yield from findings
+
+
+def _examine(admit: Callable[[], Patient]) -> list[Finding]:
+    """All that is wrong with a character."""
+    patient = admit()
+    findings, views, pictures, alphas = list(patient.findings), [], [], []
+    held = 0
+    for view in patient.views:
+        picture, wrong = picture_findings(view.file, view.size)
+        findings += wrong
+        if picture is None or held + picture.size > MOST_PIXELS_HELD:
+            continue
+        held += picture.size
+        mask, wrong = _mask(view, picture.shape[:2])
+        findings += wrong
+        alpha = figure_alpha(picture, mask)
+        findings += figure_findings(view, picture, alpha)
+        if alpha is not None and picture.shape[1::-1] == view.size:
+            views.append(view)
+            pictures.append(picture)
+            alphas.append(alpha)
+    targets = [place for place, view in enumerate(views) if not view.is_source]
+    findings += duplicates(
+        [views[place].file for place in targets],
+        [pictures[place] for place in targets],
+        [views[place].matrix for place in targets],
+    )
+    sight = seen(views, pictures, alphas) if views else None
+    if sight is not None:
+        findings += geometry_findings(patient, sight)[0]
+    return [*findings, *mesh_findings(patient, sight)]
+
+
+def _mask(view: View, shape: tuple[int, int]) -> tuple[np.ndarray | None, list[Finding]]:
+    """A view's mask (H, W) in [0, 1], None where there is none that fits."""
+    if view.mask is None:
+        return None, []
+    picture, findings = picture_findings(view.mask, (shape[1], shape[0]))
+    findings = [
+        one for one in findings if one.fault in ("truncated file", "unequal sizes")
+    ]  # masks may be grey of any depth
+    if picture is None or picture.shape[:2] != shape:
+        return None, findings
+    return picture[..., :3].mean(axis=-1) / 255.0, findings
+
+
+def _of_ours(root: Path, name: str) -> Patient:
+    folder = root / name
+    path = folder / TRANSFORMS_FILE
+    if not folder.is_dir():
+        fix = "Capture it, or take it out of dataset.json."
+        wrong = Finding(
+            "missing file", str(folder), "no such folder", "the character that dataset.json lists", fix
+        )
+        return Patient(name, folder, None, (), (wrong,))
+    views, findings = _read(folder, [path])
+    for file in sorted((folder / DEPTH_FOLDER).glob("*.png")):
+        findings += depth_findings(file)
+    if views and not any(view.is_source for view in views):
+        fix = "Capture the character again, or read it as a foreign set."
+        findings.append(Finding("missing entry", f"{path}: source_views", "none", "front, side or back", fix))
+    mesh = folder / MESH_FILE
+    has_mesh = mesh.is_file() and mesh.resolve().is_relative_to(folder.resolve())
+    return Patient(
+        name, folder, path, tuple(views), tuple(findings), mesh if has_mesh else None, in_our_frame=True
+    )
+
+
+def _of_foreign(form: AbstractFormat, found: Found) -> Patient:
+    if isinstance(form, TransformsJson):
+        files = camera_files(found.folder)
+        views, findings = _read(found.folder, files)
+        unique = {view.file: view for view in reversed(views)}
+        kept = tuple(view for view in views if unique[view.file] is view)
+        return Patient(found.name, found.folder, files[0] if len(files) == 1 else None, kept, tuple(findings))
+    try:
+        shots = form.shots(found)
+    except DataError as error:
+        fix = "Mend what is named, and ask again."
+        wrong = Finding(
+            "unreadable character", str(found.folder), str(error), f"a character of {form.title}", fix
+        )
+        return Patient(found.name, found.folder, None, (), (wrong,))
+    views = [
+        View(
+            name=shot.file.name,
+            file=shot.file,
+            key=shot.where,
+            matrix=np.reshape(shot.pose, (4, 4)),
+            focal=shot.focal,
+            centre=shot.centre,
+            size=shot.size,
+            mask=shot.mask,
+        )
+        for shot in shots
+    ]
+    return Patient(found.name, found.folder, None, tuple(views), ())
+
+
+def _read(folder: Path, paths: list[Path]) -> tuple[list[View], list[Finding]]:
+    """Views of camera files, and what is wrong in them."""
+    views: list[View] = []
+    findings: list[Finding] = []
+    for path in paths:
+        try:
+            some, wrong = read_camera_file(folder, path)
+        except DataError as error:
+            fix = "Write it again, or capture the character again."
+            findings.append(
+                Finding("broken camera file", str(path), str(error), "a JSON object with frames", fix)
+            )
+            continue
+        views += some
+        findings += wrong
+    return views, findings

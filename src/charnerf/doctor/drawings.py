@@ -1,0 +1,142 @@
+"""Drawings examined: files first, then what the reader of drawings makes of them."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from charnerf.doctor.figure import CROPPED
+from charnerf.doctor.finding import Finding
+from charnerf.doctor.picture_files import picture_findings
+from charnerf.doctor.repairs import mirror_command
+from charnerf.drawings.align import figure_box
+from charnerf.drawings.cutout import cut_out
+from charnerf.drawings.load import load_drawing
+from charnerf.drawings.naming import looks_left
+from charnerf.drawings.turnaround import read_views
+from charnerf.drawings.viewpoints import AZIMUTHS, Viewpoint
+from charnerf.errors import DataError
+
+SIZE = 128  # pixels at which views are compared
+SCALES = 1.1  # of the tallest figure over the shortest, in pictures of one size
+NAMES = ("front", "side", "back", *AZIMUTHS)
+SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+
+
+def drawings_in(folder: Path) -> dict[str, Path]:
+    """Drawings of a folder by the views that they are named after."""
+    files = sorted(
+        file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.stem.lower() in NAMES
+    )
+    return {file.stem.lower(): file for file in files}
+
+
+def drawing_findings(given: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
+    """What is wrong with drawings by where they are seen from."""
+    whole: dict[Viewpoint, Path] = {}
+    heights: dict[Path, tuple[float, tuple[int, int]]] = {}
+    for view, file in given.items():
+        picture, findings = picture_findings(file, (0, 0))
+        yield from (
+            one for one in findings if one.fault != "colour profile"
+        )  # drawings are read by their profile
+        if picture is None:
+            continue
+        try:
+            drawing = load_drawing(file)
+            cutout = cut_out(drawing)
+            box = figure_box(cutout.rgba[..., 3], str(file))
+        except DataError as error:
+            yield Finding(
+                "background that is not plain",
+                str(file),
+                str(error),
+                "a figure on alpha or one plain colour",
+                "Cut the figure out.",
+            )
+            continue
+        whole[view] = file
+        heights[file] = (box.height, drawing.size)
+        alpha = cutout.rgba[..., 3] > 0.5
+        border = np.concatenate((alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]))
+        if int(border.sum()) >= CROPPED:
+            yield Finding(
+                "cropped figure", str(file), f"{int(border.sum())} pixels of the figure on the picture's border",
+                "all of it, and room around", "Export the picture uncropped.", picture=_rgb(cutout.rgba),
+            )  # fmt: skip
+    yield from _scales(heights)
+    yield from _sides(whole)
+    yield from _together(whole)
+
+
+def _scales(heights: Mapping[Path, tuple[float, tuple[int, int]]]) -> Iterator[Finding]:
+    """Figures of other heights in pictures of one size; they are read as one height all the same."""
+    if len({size for _, size in heights.values()}) != 1 or len(heights) < 2:
+        return
+    tallest, shortest = (pick(heights, key=lambda file: heights[file][0]) for pick in (max, min))
+    ratio = heights[tallest][0] / heights[shortest][0]
+    if ratio > SCALES:
+        yield Finding(
+            "different scale", str(shortest),
+            f"a figure {1.0 / ratio:.2f} times as tall as {tallest.name}'s, in pictures of one size", "1.00 times",
+            f"Scale it by {ratio:.3f}; readers take all heights as one, so that a crouch is stretched.", is_broken=False,
+        )  # fmt: skip
+
+
+def _sides(whole: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
+    """Profiles that look to the other side than their name says."""
+    for view, file in whole.items():
+        if view.name not in ("left", "right"):
+            continue
+        rgba = cut_out(load_drawing(file)).rgba
+        if looks_left(_square(rgba)) != (view.name == "left"):
+            other = "right" if view.name == "left" else "left"
+            yield Finding(
+                "mirrored picture", str(file), f"a figure that looks to the picture's {other} by its feet and its face",
+                f"the character's {view.name} side, which looks to the {view.name}", f"Say --side {other}, or flip the picture.",
+                mirror_command(file), _rgb(rgba),
+            )  # fmt: skip
+
+
+def _together(whole: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
+    """What the reader of drawings warns of."""
+    if len(whole) < 2:
+        return
+    try:
+        read = read_views(whole, size=SIZE)
+    except DataError as error:
+        yield Finding(
+            "drawings that do not fit",
+            ", ".join(map(str, whole.values())),
+            str(error),
+            "views of one character",
+            "",
+        )
+        return
+    for warning in read.warnings:
+        where, _, found = warning.partition(": ")
+        fault = (
+            "mirrored picture"
+            if "unmirrored" in warning
+            else "duplicated view"
+            if "shows the same" in warning
+            else ""
+        )
+        command = mirror_command(Path(where)) if fault == "mirrored picture" else ""
+        yield Finding(
+            fault or "drawings that disagree", where, found, "views that agree", "Mend the drawing.", command,
+            picture=read.picture, is_broken=bool(fault),
+        )  # fmt: skip
+
+
+def _square(rgba: np.ndarray) -> np.ndarray:
+    """On a square, as canvases are."""
+    side = max(rgba.shape[:2])
+    square = np.zeros((side, side, 4), dtype=rgba.dtype)
+    top, left = side - rgba.shape[0], (side - rgba.shape[1]) // 2
+    square[top:, left : left + rgba.shape[1]] = rgba
+    return square
+
+
+def _rgb(rgba: np.ndarray) -> np.ndarray:
+    return (255.0 * (rgba[..., :3] * rgba[..., 3:] + 1.0 - rgba[..., 3:])).round().astype(np.uint8)

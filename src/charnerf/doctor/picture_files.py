@@ -1,0 +1,148 @@
+"""Picture files, before anything is made of them: whole, 8 bits, sRGB, of the stated size, each shown once."""
+
+import hashlib
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageCms
+
+from charnerf.doctor.finding import Finding
+from charnerf.doctor.repairs import rgba_command
+from charnerf.errors import DataError
+from charnerf.pictures import open_picture
+
+SRGB_GAMMA = 0.45455
+_PNG = b"\x89PNG\r\n\x1a\n"
+_EIGHT_BIT = ("RGB", "RGBA", "L", "LA", "P", "PA")
+_DEPTH = ("I;16", "I;16B", "I")
+
+
+def picture_findings(file: Path, size: tuple[int, int]) -> tuple[np.ndarray | None, list[Finding]]:
+    """A picture (H, W, 4) uint8, None where it can not be read, and what is wrong with its file.
+
+    Args:
+        file: The picture.
+        size: Width and height that are stated, (0, 0) where none are.
+    """
+    try:
+        with open_picture(file) as picture:
+            findings = [*_kind(file, picture), *_colors(file, picture)]
+            if size not in ((0, 0), picture.size):
+                stored = f"{picture.size[0]} x {picture.size[1]}"
+                findings.append(
+                    Finding(
+                        "unequal sizes", str(file), f"{stored} pixels", f"{size[0]} x {size[1]} as its camera file says",
+                        "Resize the picture, or correct w, h, fl_x, fl_y, cx and cy of its frame.",
+                    )
+                )  # fmt: skip
+            return np.array(picture.convert("RGBA")), findings
+    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
+        found = (
+            str(error)
+            if isinstance(error, DataError)
+            else f"{file.stat().st_size if file.exists() else 0} bytes, {error}"
+        )
+        fix = "Copy it again, or capture the character again."
+        return None, [Finding("truncated file", str(file), found, "a picture that opens whole", fix)]
+
+
+def depth_findings(file: Path) -> list[Finding]:
+    """What is wrong with a depth picture's file."""
+    try:
+        with open_picture(file) as picture:
+            mode = picture.mode
+    except (OSError, SyntaxError, ValueError) as error:
+        return [
+            Finding(
+                "truncated file",
+                str(file),
+                str(error),
+                "a picture that opens whole",
+                "Capture the character again.",
+            )
+        ]
+    if mode in _DEPTH:
+        return []
+    command = "charnerf capture MESH -o DATASET --split SPLIT --depth"
+    return [
+        Finding(
+            "wrong bit depth",
+            str(file),
+            f"mode {mode}",
+            "16-bit grey, millimetres",
+            "Capture it again.",
+            command,
+        )
+    ]
+
+
+def duplicates(
+    files: Sequence[Path], pictures: Sequence[np.ndarray], matrices: Sequence[np.ndarray]
+) -> Iterator[Finding]:
+    """Pictures of one content, and cameras of one pose, under two names."""
+    seen: dict[str, int] = {}
+    for index, picture in enumerate(pictures):
+        if not picture[..., 3].any():
+            continue
+        digest = hashlib.sha256(picture.tobytes()).hexdigest()
+        first = seen.setdefault(digest, index)
+        if first != index:
+            yield Finding(
+                "duplicated view", str(files[index]), f"the same pixels as {files[first].name}", "another view",
+                "Leave one of the two out, or restore the picture that belongs there.", picture=picture[..., :3],
+            )  # fmt: skip
+    poses: dict[bytes, int] = {}
+    for index, matrix in enumerate(matrices):
+        first = poses.setdefault(np.round(matrix, 6).tobytes(), index)
+        if first != index and not np.array_equal(pictures[first], pictures[index]):
+            yield Finding(
+                "duplicated view", str(files[index]), f"the pose of {files[first].name} and another picture", "a pose of its own",
+                "One of the two poses is wrong: write it anew.",
+            )  # fmt: skip
+
+
+def _kind(file: Path, picture: Image.Image) -> Iterator[Finding]:
+    """Bits of a channel: PNG says them in its header, which Pillow hides for 16-bit colours."""
+    with file.open("rb") as raw:
+        head = raw.read(26)
+    bits = head[24] if head.startswith(_PNG) and len(head) > 24 else 8
+    if picture.mode in _EIGHT_BIT and bits in (8, 4, 2, 1) and (bits == 8 or picture.mode in ("P", "PA")):
+        return
+    yield Finding(
+        "wrong bit depth", str(file), f"{bits} bits a channel, mode {picture.mode}", "8 bits a channel, RGB or RGBA",
+        "Write it with 8 bits.", rgba_command(file),
+    )  # fmt: skip
+
+
+def _colors(file: Path, picture: Image.Image) -> Iterator[Finding]:
+    """Colours that are not sRGB's: readers of data sets take bytes as they are."""
+    profile, gamma = picture.info.get("icc_profile"), picture.info.get("gamma")
+    if profile:
+        name = _profile_name(profile)
+        if "srgb" not in name.lower():
+            yield Finding(
+                "colour profile",
+                str(file),
+                f"the profile {name!r}",
+                "sRGB",
+                "Convert it to sRGB.",
+                rgba_command(file),
+            )
+    elif gamma and abs(float(gamma) - SRGB_GAMMA) > 0.01 and "srgb" not in picture.info:
+        yield Finding(
+            "colour profile",
+            str(file),
+            f"gamma {float(gamma):.3g}",
+            "sRGB",
+            "Write it as sRGB, without a gamma.",
+            rgba_command(file),
+        )
+
+
+def _profile_name(profile: bytes) -> str:
+    try:
+        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(profile))).strip()
+    except (ImageCms.PyCMSError, OSError, TypeError) as error:
+        return f"unreadable: {error}"
