@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from charnerf.doctor.finding import Finding
+    from charnerf.drawings.viewpoints import Viewpoint
 
 EXAMPLES = (
     "charnerf doctor characters",
@@ -21,6 +22,7 @@ EXAMPLES = (
 )
 BROKEN = 1  # exit status
 SHOWN = 20  # findings on the terminal
+ORDER = ("front", "left", "back")
 Subject = Annotated[
     list[Path],
     typer.Argument(
@@ -91,16 +93,18 @@ def _findings(subject: list[Path], jobs: int | None, trusted: tuple[str, ...]) -
             yield from dataset_findings(first, processes=jobs, examined=examined)
 
 
-def _by_view(files: list[Path]):  # type: ignore[no-untyped-def]
-    """FRONT SIDE [BACK], or the figures of one sheet."""
-    from charnerf.cli.drawings import given_drawings
+def _by_view(files: list[Path]) -> "dict[Viewpoint, Path]":
+    """FRONT SIDE [BACK]."""
+    from charnerf.drawings.viewpoints import viewpoint
 
-    if any(not one.is_file() for one in files):
-        raise ConfigError(f"{' '.join(map(str, files))}: found folders among files, expected drawings alone.")
-    return given_drawings(files, None, side_shows="left", order=None, figures=None, say=say).drawings
+    if any(not one.is_file() for one in files) or not 2 <= len(files) <= len(ORDER):
+        raise ConfigError(
+            f"{' '.join(map(str, files))}: expected FRONT SIDE [BACK], files; a sheet is cut up by `charnerf reconstruct` first."
+        )
+    return {viewpoint(name): file for name, file in zip(ORDER, files, strict=False)}
 
 
-def _named(drawings: dict[str, Path]):  # type: ignore[no-untyped-def]
+def _named(drawings: dict[str, Path]) -> "dict[Viewpoint, Path]":
     """Drawings by the views of their names; side is the left one."""
     from charnerf.drawings.viewpoints import viewpoint
 

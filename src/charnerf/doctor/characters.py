@@ -22,7 +22,7 @@ from charnerf.foreign.base import AbstractFormat, Found
 from charnerf.foreign.kept import is_ours, recognised
 from charnerf.foreign.transforms_json import TransformsJson, camera_files
 
-MOST_PIXELS_HELD = 600_000_000  # of a character's pictures at once
+MOST_BYTES_HELD = 2**30  # of a character's pictures at once; further ones are not examined
 
 
 def dataset_findings(
@@ -58,34 +58,43 @@ def dataset_findings(
 
 
 def _examine(admit: Callable[[], Patient]) -> list[Finding]:
-    """All that is wrong with a character."""
+    """All that is wrong with a character; views whose pictures are wrong say nothing of cameras and mesh."""
     patient = admit()
-    findings, views, pictures, alphas = list(patient.findings), [], [], []
-    held = 0
+    findings = list(patient.findings)
+    views: list[View] = []
+    pictures: list[np.ndarray] = []
+    alphas: list[np.ndarray] = []
     for view in patient.views:
-        picture, wrong = picture_findings(view.file, view.size)
+        if sum(picture.size for picture in pictures) > MOST_BYTES_HELD:
+            break
+        picture, alpha, wrong = _examined_view(view)
         findings += wrong
-        if picture is None or held + picture.size > MOST_PIXELS_HELD:
-            continue
-        held += picture.size
-        mask, wrong = _mask(view, picture.shape[:2])
-        findings += wrong
-        alpha = figure_alpha(picture, mask)
-        findings += figure_findings(view, picture, alpha)
-        if alpha is not None and picture.shape[1::-1] == view.size:
+        if picture is not None and alpha is not None:
             views.append(view)
             pictures.append(picture)
             alphas.append(alpha)
-    targets = [place for place, view in enumerate(views) if not view.is_source]
-    findings += duplicates(
-        [views[place].file for place in targets],
-        [pictures[place] for place in targets],
-        [views[place].matrix for place in targets],
-    )
-    sight = seen(views, pictures, alphas) if views else None
-    if sight is not None:
-        findings += geometry_findings(patient, sight)[0]
-    return [*findings, *mesh_findings(patient, sight)]
+    twice = list(duplicates(views, pictures))
+    again = {one.where for one in twice}
+    kept = [place for place, view in enumerate(views) if str(view.file) not in again]
+    findings += twice
+    if not kept:
+        return [*findings, *mesh_findings(patient, None)]
+    views, pictures, alphas = ([every[place] for place in kept] for every in (views, pictures, alphas))  # type: ignore[assignment]
+    wrong, agreeing = geometry_findings(patient, seen(views, pictures, alphas))
+    return [*findings, *wrong, *mesh_findings(patient, agreeing)]
+
+
+def _examined_view(view: View) -> tuple[np.ndarray | None, np.ndarray | None, list[Finding]]:
+    """A view's picture and alpha, None where they are of no use to geometry, and what is wrong with them."""
+    picture, findings = picture_findings(view.file, view.size)
+    if picture is None:
+        return None, None, findings
+    mask, wrong = _mask(view, picture.shape[:2])
+    findings += wrong
+    alpha = figure_alpha(picture, mask)
+    wrong = list(figure_findings(view, picture, alpha))
+    fits = picture.shape[1::-1] == view.size
+    return picture, alpha if fits and not wrong else None, findings + wrong
 
 
 def _mask(view: View, shape: tuple[int, int]) -> tuple[np.ndarray | None, list[Finding]]:

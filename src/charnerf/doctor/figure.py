@@ -73,10 +73,8 @@ def _specks(shown: np.ndarray) -> np.ndarray:
     sizes = ndimage.sum_labels(shown, labels, range(1, count + 1))
     largest = labels == 1 + int(np.argmax(sizes))
     apart = ndimage.distance_transform_edt(~largest)
-    small = np.isin(labels, 1 + np.flatnonzero(sizes < 0.002 * shown.sum())) & (
-        apart > 0.15 * max(shown.shape)
-    )
-    return small
+    few = max(2.0, 0.002 * shown.sum())
+    return np.isin(labels, 1 + np.flatnonzero(sizes <= few)) & (apart > 0.1 * max(shown.shape))
 
 
 def _border(values: np.ndarray) -> np.ndarray:

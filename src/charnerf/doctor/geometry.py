@@ -40,8 +40,8 @@ CONVENTIONS: dict[str, tuple[str, str, Callable[[Tensor], Tensor]]] = {  # by th
 }  # fmt: skip
 
 
-def geometry_findings(patient: Patient, sight: Seen) -> tuple[list[Finding], Consensus | None]:
-    """What is wrong with the cameras of a character, and the hull of those that agree."""
+def geometry_findings(patient: Patient, sight: Seen) -> tuple[list[Finding], Seen | None]:
+    """What is wrong with the cameras of a character, and the views that agree; None where these are not known."""
     kept = (sight.alphas > INSIDE).flatten(1).any(1).nonzero()[:, 0]
     if len(kept) < LEAST_VIEWS:
         return [], None
@@ -54,7 +54,7 @@ def geometry_findings(patient: Patient, sight: Seen) -> tuple[list[Finding], Con
     carving = carving_views(sight.cameras)
     first = consensus(sight.cameras, sight.alphas, carving)
     if first is not None and first.agrees:
-        return list(_frame_findings(patient, sight, first)), first
+        return list(_frame_findings(patient, sight, first)), sight
     by_convention = _convention(patient, sight, carving, first)
     if by_convention is not None:
         return [by_convention], None
@@ -75,9 +75,11 @@ def geometry_findings(patient: Patient, sight: Seen) -> tuple[list[Finding], Con
             )
         ], None  # fmt: skip
     views, agreed = blamed
-    if agreed is None:
-        return [], None
-    return [_of_view(sight, view, agreed, views) for view in views], agreed
+    agreeing = torch.tensor([view for view in range(len(sight.views)) if view not in views])
+    cut = 0.0 if first is None else float(first.covered.min())
+    return [one for view in views for one in _of_view(sight, view, agreed, views, cut)], _some(
+        sight, agreeing
+    )
 
 
 def overlay(sight: Seen, view: int, hull: Consensus) -> np.ndarray:
@@ -112,39 +114,43 @@ def _convention(patient: Patient, sight: Seen, carving: list[int], first: Consen
     return None
 
 
-def _of_view(sight: Seen, view: int, hull: Consensus, blamed: list[int]) -> Finding:
+def _of_view(sight: Seen, view: int, hull: Consensus, blamed: list[int], cut: float) -> Iterator[Finding]:
     """What is wrong with one view that disagrees with all others."""
-    one, mask, shown = sight.views[view], sight.alphas[view] > INSIDE, hull.shown[view]
-    covered = 100 * float(hull.covered[view])
-    evidence = f"a silhouette of which the other views' hull covers {covered:.0f} %"
+    one, mask = sight.views[view], sight.alphas[view] > INSIDE
+    evidence = (
+        f"a silhouette of which the other views' hull covers {100 * float(hull.covered[view]):.0f} %, and which leaves"
+        f" {100 * cut:.0f} % of another one"
+    )
     picture, all_of_it = overlay(sight, view, hull), f"{100 * COVERED:.0f} % or more"
-    flipped = mask.flip(-1)
+    partner = next(
+        (two for two in blamed if two != view and hull.fits(view, sight.alphas[two] > INSIDE)), None
+    )
+    if partner is not None:
+        if partner > view:
+            yield Finding(
+                "pictures in another order", str(one.file), f"{evidence}, and all of {sight.views[partner].file.name}",
+                all_of_it, "Exchange the two pictures.", picture=picture,
+            )  # fmt: skip
+        return
     shift = round(float(2.0 * sight.cameras.principal_point[view, 0])) - mask.shape[-1]
-    flipped = torch.roll(flipped, shift, dims=-1)
-    if _share(flipped, shown) >= COVERED:
-        return Finding(
-            "mirrored picture", str(one.file), f"{evidence}, and {100 * _share(flipped, shown):.0f} % flipped left to right",
+    if hull.fits(view, torch.roll(mask.flip(-1), shift, dims=-1)):
+        yield Finding(
+            "mirrored picture", str(one.file), f"{evidence}, and all of it flipped left to right",
             all_of_it, "Flip the picture.", mirror_command(one.file), picture,
         )  # fmt: skip
-    other = next(
-        (two for two in blamed if two != view and _share(sight.alphas[two] > INSIDE, shown) >= COVERED), None
-    )
-    if other is not None:
-        return Finding(
-            "pictures in another order", str(one.file), f"{evidence}, and all of {sight.views[other].file.name}",
-            all_of_it, "Exchange the two pictures.", picture=picture,
-        )  # fmt: skip
+        return
     own, expected = _box(mask), _projected_box(sight.cameras[view : view + 1], hull)
     ratio = float((own[3] - own[1]) / (expected[3] - expected[1]))
     if abs(ratio - 1.0) > OFF_SCALE:
-        return Finding(
+        yield Finding(
             "different scale", str(one.file), f"a figure {ratio:.2f} times as tall as the other views say; {evidence}",
             "1.00 times", f"Scale the picture by {1.0 / ratio:.3f}, or multiply its fl_x and fl_y by {ratio:.3f}.", picture=picture,
         )  # fmt: skip
+        return
     middle = 0.5 * (own[:2] + own[2:] - expected[:2] - expected[2:])
     angle = float(torch.rad2deg(torch.atan(middle.norm() / sight.cameras.focal[view].mean())))
     amount = "" if one.is_orthographic else f" ({angle:.1f} degrees)"
-    return Finding(
+    yield Finding(
         "misaligned camera", one.key, f"{evidence}, its middle {float(middle.norm()):.0f} of {mask.shape[-1]} pixels{amount} off",
         all_of_it, "Calibrate this view again, or take it out.", picture=picture,
     )  # fmt: skip
@@ -165,22 +171,24 @@ def _frame_findings(patient: Patient, sight: Seen, hull: Consensus) -> Iterator[
         return
     box = ", ".join(f"{float(a):.2f} to {float(b):.2f}" for a, b in zip(low, high, strict=True))
     reach = torch.maximum(high - low.new_tensor(CENTRE), low.new_tensor(CENTRE) - low)
-    if bool((reach > BOX_HALF_EXTENT).any()):
+    stands = abs(float(low[2])) <= STANDING and abs(float(high[2]) - HEIGHT) <= STANDING
+    if bool((high - low > 2.0 * BOX_HALF_EXTENT).any()) or (stands and bool((reach > BOX_HALF_EXTENT).any())):
         yield Finding(
             "near and far cut", str(patient.folder), f"a figure at x, y, z = {box} m",
             f"one within {BOX_HALF_EXTENT} m of {CENTRE}",
             "Rays end there: scale it to 2 m on z = 0, or train with a larger model.box_half_extent.",
             "charnerf capture MESH -o DATASET --split SPLIT",
         )  # fmt: skip
-    elif abs(float(low[2])) > STANDING or abs(float(high[2]) - HEIGHT) > STANDING:
+    elif not stands:
         yield Finding(
             "wrong frame", str(patient.folder), f"a figure at x, y, z = {box} m", "one from z = 0 to z = 2 m, +Z up",
             "Turn its y axis up to z, and scale it to 2 m.", "charnerf capture MESH -o DATASET --split SPLIT --up y",
         )  # fmt: skip
 
 
-def _share(mask: Tensor, shown: Tensor) -> float:
-    return float((mask & shown).sum() / mask.sum().clamp_min(1))
+def _some(sight: Seen, index: Tensor) -> Seen:
+    views = tuple(sight.views[one] for one in index.tolist())
+    return Seen(views, sight.cameras[index], sight.alphas[index], sight.rgb[index.numpy()])
 
 
 def _box(mask: Tensor) -> Tensor:

@@ -10,6 +10,7 @@ from PIL import Image, ImageCms
 
 from charnerf.doctor.finding import Finding
 from charnerf.doctor.repairs import rgba_command
+from charnerf.doctor.views import View
 from charnerf.errors import DataError
 from charnerf.pictures import open_picture
 
@@ -28,7 +29,10 @@ def picture_findings(file: Path, size: tuple[int, int]) -> tuple[np.ndarray | No
     """
     try:
         with open_picture(file) as picture:
-            findings = [*_kind(file, picture), *_colors(file, picture)]
+            findings = list(_kind(file, picture))
+            if findings:
+                return None, findings
+            findings = list(_colors(file, picture))
             if size not in ((0, 0), picture.size):
                 stored = f"{picture.size[0]} x {picture.size[1]}"
                 findings.append(
@@ -78,27 +82,24 @@ def depth_findings(file: Path) -> list[Finding]:
     ]
 
 
-def duplicates(
-    files: Sequence[Path], pictures: Sequence[np.ndarray], matrices: Sequence[np.ndarray]
-) -> Iterator[Finding]:
-    """Pictures of one content, and cameras of one pose, under two names."""
-    seen: dict[str, int] = {}
-    for index, picture in enumerate(pictures):
-        if not picture[..., 3].any():
+def duplicates(views: Sequence[View], pictures: Sequence[np.ndarray]) -> Iterator[Finding]:
+    """Target pictures of one content, and target cameras of one pose, under two names."""
+    contents: dict[str, int] = {}
+    poses: dict[bytes, int] = {}
+    for index, (view, picture) in enumerate(zip(views, pictures, strict=True)):
+        if view.is_source:
             continue
-        digest = hashlib.sha256(picture.tobytes()).hexdigest()
-        first = seen.setdefault(digest, index)
-        if first != index:
+        same = contents.setdefault(hashlib.sha256(picture.tobytes()).hexdigest(), index)
+        if same != index:
             yield Finding(
-                "duplicated view", str(files[index]), f"the same pixels as {files[first].name}", "another view",
+                "duplicated view", str(view.file), f"the same pixels as {views[same].file.name}", "another view",
                 "Leave one of the two out, or restore the picture that belongs there.", picture=picture[..., :3],
             )  # fmt: skip
-    poses: dict[bytes, int] = {}
-    for index, matrix in enumerate(matrices):
-        first = poses.setdefault(np.round(matrix, 6).tobytes(), index)
-        if first != index and not np.array_equal(pictures[first], pictures[index]):
+            continue
+        there = poses.setdefault(np.round(view.matrix, 6).tobytes(), index)
+        if there != index:
             yield Finding(
-                "duplicated view", str(files[index]), f"the pose of {files[first].name} and another picture", "a pose of its own",
+                "duplicated view", str(view.file), f"the pose of {views[there].file.name} and another picture", "a pose of its own",
                 "One of the two poses is wrong: write it anew.",
             )  # fmt: skip
 
