@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "charnerf doctor characters",
     "charnerf doctor front.png side.png back.png",
-    "charnerf doctor outputs/run/<date>",
+    "charnerf doctor outputs/run",
 )
 BROKEN = 1  # exit status
 SHOWN = 20  # findings on the terminal
