@@ -134,6 +134,28 @@ def test_flags_after_two_dashes_are_names(tmp_path, monkeypatch, capsys):
     assert "--quiet" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("charnerf reconstru", ["reconstruct"]),
+        ("charnerf mesh --charac", ["--character"]),
+        ("charnerf mesh --data DATASET --character ", ["NAME"]),
+        ("charnerf evaluate --data DATASET --split t", ["test"]),
+        ("charnerf mesh --data nowhere --character ", []),
+        ("charnerf reconstruct --texture d", ["drawings"]),
+    ],
+)
+def test_tab_completes(words, offered, dataset, monkeypatch, capsys):
+    """As bash asks: all words, and the place of the one that is typed."""
+    name = next(path.name for path in dataset.iterdir() if path.is_dir())
+    words = words.replace("DATASET", shlex.quote(str(dataset)))
+    monkeypatch.setenv("_CHARNERF_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(shlex.split(words)) - (not words.endswith(" "))))
+    assert run([]) == 0
+    assert capsys.readouterr().out.split() == [one.replace("NAME", name) for one in offered]
+
+
 def test_env_tells_versions_and_machine(tmp_path, capsys):
     assert run(["env", "--json", str(tmp_path / "env.json")]) == 0
     text, facts = capsys.readouterr().out, json.loads((tmp_path / "env.json").read_text())

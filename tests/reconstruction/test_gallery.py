@@ -47,7 +47,7 @@ def test_a_row_a_folder(folders, tmp_path):
 def test_a_missing_drawing_is_named_before_any_work(folders, tmp_path):
     (folders[1] / "back.webp").unlink()
     model = RedModel()
-    with pytest.raises(DataError, match=r"two: found none as the back view"):
+    with pytest.raises(DataError, match=r"two: found no picture of the back view"):
         gallery.write_gallery(model, folders, tmp_path / "gallery.png", size=40)
     assert model.given == []
     Image.new("RGB", (30, 60)).save(folders[0] / "right.png")

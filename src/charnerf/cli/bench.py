@@ -1,6 +1,7 @@
 """`charnerf bench`: error against run time."""
 
 import json
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +9,8 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Device, SomeDataset, Trusted, Weights
+from charnerf.cli.options import Device, SomeDataset, SplitName, Trusted, Weights
+from charnerf.cli.summary import Summary, close
 
 EXAMPLES = ("charnerf bench --quick", "charnerf bench outputs/run --data characters --json bench.json")
 
@@ -26,7 +28,7 @@ def command(
         Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For the sweep's diagram.")
     ] = Path("outputs/bench"),
     data: SomeDataset = None,
-    split: Annotated[str, typer.Option(metavar="NAME", help="Split of the data set.")] = "test",
+    split: SplitName = "test",
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
@@ -34,8 +36,11 @@ def command(
     from charnerf.bench.run import run, summary
     from charnerf.files import write_text
 
+    began = time.perf_counter()
     model = load_model(weights, device=device, trust=trust)
     result = run(model, data=data, split=split, quick=quick, output=output, say=say)
     if json_file is not None:
         write_text(json_file, json.dumps(result, indent=2) + "\n")
     typer.echo(summary(result))
+    files = [*([] if quick else [output]), *([] if json_file is None else [json_file])]
+    close(Summary(made="error against run time", files=files, began=began), None)

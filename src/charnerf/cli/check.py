@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from charnerf.cli.model import load_model, pick_device
-from charnerf.cli.options import Device, SomeDataset, Trusted
+from charnerf.cli.options import Device, SomeCharacter, SomeDataset, Trusted
 from charnerf.cli.summary import JsonFile, Summary, check_json, close
 from charnerf.errors import DataError
 
@@ -39,9 +39,7 @@ def command(
         typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For check.json and check.png."),
     ] = Path("outputs/check"),
     data: SomeDataset = None,
-    character: Annotated[
-        str | None, typer.Option("--character", metavar="NAME", help="Its name; the first one if left out.")
-    ] = None,
+    character: SomeCharacter = None,
     device: Device = "auto",
     trust: Trusted = None,
     json_file: JsonFile = None,

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from charnerf.cli.completion import characters
 from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.options import Folder, gathered
 from charnerf.cli.summary import JsonFile, Summary, check_json, close, typed
@@ -19,7 +20,12 @@ def command(
     *,
     data: GivenDataset,
     character: Annotated[
-        list[str], typer.Option(metavar="NAME", help="Character of the data set; may be given several times.")
+        list[str],
+        typer.Option(
+            metavar="NAME",
+            autocompletion=characters,
+            help="Character of the data set; may be given several times.",
+        ),
     ],
     output: Folder,
     size: Annotated[int, typer.Option(min=32, max=4096, help="Side of every drawing, pixels.")] = 512,

@@ -1,6 +1,7 @@
 """`charnerf evaluate`: a model measured on a split."""
 
 import json
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,13 +11,14 @@ import typer
 
 from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.drawings import reading_options
-from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
-from charnerf.cli.options import Device, Trusted, Weights, gathered, is_count
+from charnerf.cli.options import Device, SplitName, Trusted, Weights, gathered, is_count
+from charnerf.cli.summary import Summary, close
 from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions
+from charnerf.wording import counted
 
 if TYPE_CHECKING:
     from charnerf.data.characters import Character
@@ -81,7 +83,7 @@ def command(
     *,
     data: GivenDataset,
     weights: Weights = None,
-    split: Annotated[str, typer.Option(metavar="NAME", help="Split to measure on.")] = "test",
+    split: SplitName = "test",
     views: NumViews = None,
     json_file: JsonFile = None,
     output: Kept = None,
@@ -99,7 +101,7 @@ def command(
 
     Prints metrics.json.
     """
-    num_views = _number_of_views(views)
+    began, num_views = time.perf_counter(), _number_of_views(views)
     if resolution is not None:
         MeshOptions(resolution=resolution)
     from charnerf.evaluation.evaluate import as_captured, evaluate
@@ -125,7 +127,7 @@ def command(
         train_seconds=_train_seconds(run),
         redrawn=as_captured if drawn is None else _redrawn(drawn, model.image_size, reading),
     )
-    _write(metrics, output, json_file)
+    _write(metrics, output, json_file, began)
     typer.echo(json.dumps(metrics, indent=2))
 
 
@@ -136,16 +138,20 @@ def _check_folders(output: Path | None, json_file: Path | None) -> None:
             check_folder(folder)
 
 
-def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None) -> None:
-    """Write metrics.json and the report into the folder of predictions, and the metrics to a file."""
+def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None, began: float) -> None:
+    """Write metrics.json and the report into the folder of predictions, and the metrics to a file; say how good they are."""
     from charnerf.evaluation.metrics_file import write_metrics
-    from charnerf.reporting.run_report import write_run_report
+    from charnerf.reporting.run_report import verdict, write_run_report
 
+    files: list[Path] = []
     if output is not None:
         write_metrics(output / "metrics.json", metrics)
-        say(f"report: {write_run_report(output)}")
+        files += [write_run_report(output).with_suffix(".html"), output / "metrics.json"]
     if json_file is not None:
         write_metrics(json_file, metrics)
+        files.append(json_file)
+    made = f"figures of {counted(metrics['num_characters'], 'character')}"
+    close(Summary(made=made, files=files, began=began, quality=verdict(metrics)), None)
 
 
 def _number_of_views(text: str | None) -> int | Literal["all"] | None:

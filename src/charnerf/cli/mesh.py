@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from charnerf.cli.completion import characters, splits
 from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
@@ -42,12 +43,18 @@ EXAMPLES = (
 
 Name = Annotated[
     str | None,
-    typer.Option("--character", metavar="NAME", help="Character of the data set; this or --split."),
+    typer.Option(
+        "--character",
+        metavar="NAME",
+        autocompletion=characters,
+        help="Character of the data set; this or --split.",
+    ),
 ]
 Split = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
+        autocompletion=splits,
         help="All characters of a split, and DIR/meshes.md: what meshes and each kind of colours are worth.",
     ),
 ]

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from charnerf.cli.completion import characters, splits
 from charnerf.meshing.options import MeshOptions, Texture
 
 Weights = Annotated[
@@ -46,6 +47,15 @@ SomeDataset = Annotated[
         exists=True,
         file_okay=False,
         help="Data set of the characters; embedded ones if left out.",
+    ),
+]
+SplitName = Annotated[
+    str, typer.Option("--split", metavar="NAME", autocompletion=splits, help="Split of the data set.")
+]
+SomeCharacter = Annotated[
+    str | None,
+    typer.Option(
+        "--character", metavar="NAME", autocompletion=characters, help="Its name; the first one if left out."
     ),
 ]
 Folder = Annotated[

@@ -55,7 +55,7 @@ def close(summary: Summary, json_file: Path | None) -> None:
     seconds = time.perf_counter() - summary.began
     parts = {
         "made": [summary.made],
-        "where": [", ".join(map(str, summary.files))],
+        "where": [", ".join(map(str, summary.files))] if summary.files else [],
         "how good": [summary.quality] if summary.quality else [],
         "how long": [seconds_text(seconds)],
         "try": summary.try_,
@@ -72,7 +72,7 @@ def close(summary: Summary, json_file: Path | None) -> None:
         "seconds": seconds,
         "try": list(summary.try_),
         "next": list(summary.next_),
-        **summary.facts,
+        "details": summary.facts,
     }
     write_json(content, json_file)
 

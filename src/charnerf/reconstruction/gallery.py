@@ -78,10 +78,10 @@ def _find(folder: Path, *stems: str) -> Path:
         if path.stem.lower() in stems and path.suffix.lower() in SUFFIXES
     ]
     if len(matches) != 1:
-        names = ", ".join(path.name for path in matches) or "none"
+        found = f"found {', '.join(path.name for path in matches)}" if matches else "found no picture"
         raise DataError(
-            f"{folder}: found {names} as the {stems[0]} view, expected one picture named {' or '.join(stems)} "
-            f"({', '.join(SUFFIXES)}); rename or add it."
+            f"{folder}: {found} of the {stems[0]} view, expected one named {' or '.join(stems)} ({', '.join(SUFFIXES)}); rename or"
+            " add it."
         )
     return matches[0]
 

@@ -73,7 +73,7 @@ def report_blocks(made: Made) -> list[Block]:
     blocks += [Bullets(made.suggestions)] if made.suggestions else []
     blocks += [Mesh(made.folder / "mesh.glb", f"The mesh, to be turned: {mesh_words(made.built)}")]
     blocks += [SideBySide([*(Picture(view, f"{int(view.stem)}°, rendered") for view in shown)])]
-    blocks += [Film(made.film, f"Turntable{f': {made.film_note}' if made.film_note else ''}")]
+    blocks += [Film(made.film, f"Turntable{f': {made.film_note}' if made.film_note else ''}", made.views[0])]
     blocks += [
         Picture(made.folder / "sheet.png", "The drawings as the model took them, and the result all around")
     ]

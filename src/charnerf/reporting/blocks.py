@@ -58,10 +58,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class Film:
-    """A turntable below the report's folder, MP4 or GIF."""
+    """A turntable below the report's folder, MP4 or GIF, and a picture to be seen before it plays."""
 
     path: Path
     caption: str
+    still: Path
 
 
 @dataclass(frozen=True)

@@ -89,15 +89,12 @@ def _(block: Picture) -> str:
 
 @_html.register
 def _(block: Film) -> str:
-    caption = html.escape(block.caption)
-    source = _data_address(
-        block.path.read_bytes(), f"{'video/mp4' if block.path.suffix == '.mp4' else 'image/gif'}"
-    )
+    caption, content = html.escape(block.caption), block.path.read_bytes()
     if block.path.suffix != ".mp4":
-        return _figure(f'<img alt="{caption}" src="{source}">', caption)
-    return _figure(
-        f'<video controls loop muted playsinline aria-label="{caption}" src="{source}"></video>', caption
-    )
+        return _figure(f'<img alt="{caption}" src="{_data_address(content, "image/gif")}">', caption)
+    still, source = _embedded(block.still), _data_address(content, "video/mp4")
+    video = f'<video controls loop muted playsinline preload="none" poster="{still}" src="{source}"'
+    return _figure(f'{video} aria-label="{caption}"></video>', caption)
 
 
 @_html.register
