@@ -24,7 +24,6 @@ from benchmarks.setting import Setting
 from benchmarks.steps import step_at_scale
 from benchmarks.threads import thread_rows
 from benchmarks.tricks import tricks
-from benchmarks.turntable import turntable
 from benchmarks.untrained import network_of, resized_network
 from charnerf.bench.headline import compare, headline
 from charnerf.bench.plots import plot_work_precision
@@ -32,7 +31,8 @@ from charnerf.bench.rendering import measure
 from charnerf.bench.subjects import NUM_PIXELS, subject
 from charnerf.bench.sweep import Method, sample_methods, sweep
 from charnerf.bench.timing import in_turns
-from charnerf.bench.workbench import ADAPTIVE, CULLED, DENSE, Workbench
+from charnerf.bench.turntable import turntable
+from charnerf.bench.workbench import ADAPTIVE, BAKED, BASELINE, CULLED, DENSE, Workbench
 from charnerf.geometry.resizing import resized_views
 from charnerf.inference.build import build_renderer
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -116,6 +116,16 @@ def _resolutions(setting: Setting) -> list[dict[str, Any]]:
     return rows
 
 
+def _turntables(setting: Setting) -> list[dict[str, Any]]:
+    """A turntable of every character, beside the baseline's by its rays a second on random pixels."""
+    rows = []
+    for one in setting.characters:
+        baseline = measure(one, {}, repeats=3, reference=torch.ones_like(one.truth))[BASELINE]
+        taken = turntable(one, setting.bench.renderers[BAKED])
+        rows.append({"subject": one.name, **taken.as_dict(baseline.rays_per_second)})
+    return rows
+
+
 def _arithmetic(setting: Setting) -> list[dict[str, Any]]:
     """Products of matrices against the machine's peak, at the model's width and at 512 with seeded weights."""
     rows = []
@@ -173,7 +183,7 @@ PARTS: dict[str, Part] = {
     "compile": partial(_swept, compiled_methods, "compile"),
     "exactness": _exactness,
     "hull": lambda setting: cut_by_hull(setting.bench.network, setting.every),
-    "turntable": lambda setting: turntable(setting.characters[0], setting.bench.renderers[ADAPTIVE]),
+    "turntable": _turntables,
     "size": lambda setting: large_network(setting.pictured[0], repeats=1),
     "arithmetic": _arithmetic,
     "steps": lambda setting: [

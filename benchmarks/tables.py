@@ -168,8 +168,8 @@ SECTIONS: dict[str, tuple[str, Show]] = {
     "turntable": (
         "Turntable",
         _table(
-            "36 whole frames with hull, encoding and all by `renderer=adaptive`; the baseline's seconds are extrapolated "
-            "from 512 timed pixels."
+            "36 frames of 192 pixels by `renderer=baked`, baking included, and single ones of 256; the baseline's seconds are "
+            "extrapolated from 512 timed pixels."
         ),
     ),
     "size": ("At pixelNeRF's size", _size),

@@ -14,8 +14,8 @@ from benchmarks.kinds import KINDS
 from benchmarks.roofline import IN_PLACE, roofline
 from benchmarks.scaling import exponent, grow
 from benchmarks.tricks import tricks
-from benchmarks.turntable import turned
 from benchmarks.untrained import untrained_like
+from charnerf.bench.turntable import turned
 from charnerf.volume.renderers.culled import CulledRenderer
 from support import helpers, tiny_models
 from support.subjects import LIKE, pictured_person, tiny_subject

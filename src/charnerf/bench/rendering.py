@@ -92,7 +92,7 @@ def measure(
     if baseline:
         methods[BASELINE] = partial(PixelNeRFLike(subject.network).render, subject.maps, subject.rays)
     for name, renderer in renderers.items():
-        methods[name] = partial(renderer.render, subject.scene, subject.rays)
+        methods[name] = partial(renderer.render, renderer.prepared(subject.scene), subject.rays)
     with torch.no_grad():
         timings = in_turns(methods, repeats=repeats, device=subject.truth.device, least_seconds=LEAST_SECONDS)
     truth = subject.converged if reference is None else reference

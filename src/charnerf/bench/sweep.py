@@ -14,9 +14,10 @@ from torch import Tensor
 from charnerf.bench.baseline import PixelNeRFLike
 from charnerf.bench.subjects import Subject, pixels_psnr
 from charnerf.bench.timing import in_turns
-from charnerf.bench.workbench import ADAPTIVE, BASELINE, CULLED, DENSE, Workbench
+from charnerf.bench.workbench import ADAPTIVE, BAKED, BASELINE, CULLED, DENSE, TOLERANCE, Workbench
 from charnerf.types import Rendering
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.baked import BakedRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
@@ -26,6 +27,7 @@ DENSE_SAMPLES = (4, 8, 16, 32)
 BASELINE_SAMPLES = ((16, 8), (32, 16), (64, 32), (128, 64))
 SLOW_SECONDS = 1.0  # of a method's turns in sum, after which it takes no further one
 TOLERANCES = (0.2, 0.1, 0.05, 0.02, 0.01)
+FACTORS = (1, 2, 3)  # steps of the baked grid in a pixel of the drawings
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def sweep(
 
 
 def sample_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
-    """Samples a ray: the baseline, dense, culled; and adaptive by tolerance."""
+    """Samples a ray: the baseline, dense, culled; adaptive by tolerance; and baked by the grid's step, baking excluded."""
     like = bench.like
     methods: dict[tuple[str, str], Method] = {}
     for coarse, fine in BASELINE_SAMPLES:
@@ -100,6 +102,9 @@ def sample_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
     for tolerance in TOLERANCES:
         adaptive = AdaptiveRenderer(**like, tolerance=tolerance)
         methods[ADAPTIVE, f"tolerance {tolerance:g}"] = partial(rendered_by, adaptive)
+    for factor in FACTORS:
+        baked = BakedRenderer(**like, tolerance=TOLERANCE, factor=factor)
+        methods[BAKED, f"1/{factor} pixel"] = partial(rendered_by, baked)
     return methods
 
 
@@ -110,7 +115,7 @@ def _baseline(coarse: int, fine: int, subject: Subject) -> Callable[[], Any]:
 
 def rendered_by(renderer: Any, subject: Subject) -> Callable[[], Any]:
     """The call that renders a subject's rays."""
-    return partial(renderer.render, subject.scene, subject.rays)
+    return partial(renderer.render, renderer.prepared(subject.scene), subject.rays)
 
 
 def pareto(rows: Sequence[Row]) -> list[Row]:

@@ -9,13 +9,14 @@ from charnerf.config.composition import compose_config
 from charnerf.inference.model import Model
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.baked import BakedRenderer
 from charnerf.volume.renderers.base import AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.dense import DenseRenderer
 
-BASELINE, CULLED, ADAPTIVE, DENSE = "pixelNeRF-like", "culled", "adaptive", "dense"
+BASELINE, CULLED, ADAPTIVE, BAKED, DENSE = "pixelNeRF-like", "culled", "adaptive", "baked", "dense"
 TRAINING_SCALE = "small"
-TOLERANCE = 0.05  # of conf/renderer/adaptive.yaml
+TOLERANCE = 0.05  # of conf/renderer/adaptive.yaml and baked.yaml
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Workbench:
     Attributes:
         network: The trained network.
         like: Arguments that every renderer takes, the model's own.
-        renderers: culled, adaptive and dense, in evaluation.
+        renderers: culled, adaptive, baked and dense, in evaluation.
         training: culled and dense with the number of samples of training at scale=small.
         batch_rays: Rays of a training step there.
         image_size: Of the drawings, pixels.
@@ -50,6 +51,7 @@ def workbench(model: Model) -> Workbench:
         renderers={
             CULLED: CulledRenderer(**like),
             ADAPTIVE: AdaptiveRenderer(**like, tolerance=TOLERANCE),
+            BAKED: BakedRenderer(**like, tolerance=TOLERANCE),
             DENSE: DenseRenderer(**like),
         },
         training={CULLED: CulledRenderer(**in_training), DENSE: DenseRenderer(**in_training)},

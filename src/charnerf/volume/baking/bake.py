@@ -43,9 +43,8 @@ log = logging.getLogger(__name__)
 
 FACTOR = 2  # steps of the fine grid in one of the lattice
 UNSEEN_SHARE = 0.1  # of the tolerance: light that is followed no further
-FAINT_SHARE = (
-    0.1  # of the tolerance: opacity of a metre of what counts as empty, and of a cell that is not refined
-)
+FAINT_SHARE = 0.1  # of the tolerance: opacity of a metre of what counts as empty
+THIN_SHARE = 0.2  # of the tolerance: opacity of a cell that is not refined
 LEAST_POINTS = 16  # of the lattice along its longest side, however little memory there is
 TYPICAL_VALUES = 8  # that a colour is made of, for the estimate of memory
 
@@ -154,10 +153,10 @@ class _Coarse:
         u = lattice.origin.new_full(lattice.shape, EMPTY_U)
         kept = torch.zeros_like(u)
         u[around], kept[around] = _asked(scene, lattice.points(around.nonzero()))
-        densities, faint = densities_from_u(u) * kept, FAINT_SHARE * tolerance
+        densities = densities_from_u(u) * kept
         dark = light_depths(densities, lattice.pitch) > -math.log(UNSEEN_SHARE * tolerance)
-        holding = any_corner(densities > faint) & any_corner(~dark)
-        refined = holding & any_corner(densities > faint / lattice.pitch)
+        holding = any_corner(densities > FAINT_SHARE * tolerance) & any_corner(~dark)
+        refined = holding & any_corner(densities > THIN_SHARE * tolerance / lattice.pitch)
         return cls(lattice, u, kept, dark, holding, refined, int(around.sum()))
 
     @property

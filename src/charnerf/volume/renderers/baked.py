@@ -11,7 +11,7 @@ from torch import Tensor
 
 from charnerf.scene import Scene
 from charnerf.types import ErrorEstimate, LeftOut, RayBundle, Rendering, RenderOutput
-from charnerf.volume.baking.bake import UNSEEN_SHARE, bake
+from charnerf.volume.baking.bake import FACTOR, UNSEEN_SHARE, bake
 from charnerf.volume.baking.field import BakedField
 from charnerf.volume.baking.march import Seen, march
 from charnerf.volume.quadrature.base import AbstractQuadrature
@@ -20,6 +20,9 @@ from charnerf.volume.renderers.culled import CulledRenderer
 
 log = logging.getLogger(__name__)
 
+EXACT_SHARE = (
+    0.4  # of the tolerance: estimated error of a ray's colours from which the field is asked for them
+)
 TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
 
 
@@ -37,6 +40,7 @@ class BakedRenderer(AbstractRenderer):
         hull_steps: As the culled renderer.
         memory_mib: Bound on what the grid takes, and on what is held at once, MiB.
         tolerance: Error of a colour that is aimed at, in [0, 1].
+        factor: Steps of the grid in one of the field's lattice, a drawing's pixel.
     """
 
     def __init__(
@@ -48,6 +52,7 @@ class BakedRenderer(AbstractRenderer):
         hull_steps: int,
         memory_mib: float,
         tolerance: float,
+        factor: int = FACTOR,
     ) -> None:
         super().__init__(
             quadrature=quadrature,
@@ -56,7 +61,7 @@ class BakedRenderer(AbstractRenderer):
             hull_steps=hull_steps,
             memory_mib=memory_mib,
         )
-        self.tolerance = tolerance
+        self.tolerance, self.factor = tolerance, factor
         self._culled = CulledRenderer(**self.settings)
 
     def prepared(self, scene: Scene) -> Scene:
@@ -69,7 +74,7 @@ class BakedRenderer(AbstractRenderer):
                 "renderer=culled. density=view_free can be baked."
             )
             return scene
-        baked = bake(scene, tolerance=self.tolerance, memory_mib=self.memory_mib)
+        baked = bake(scene, tolerance=self.tolerance, memory_mib=self.memory_mib, factor=self.factor)
         return Scene(BakedField(baked, scene.field.coloring, scene.field), None, scene.bounds)
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
@@ -91,8 +96,8 @@ class BakedRenderer(AbstractRenderer):
         counted = _by_ray(seen, seen.weights)
         # what was too little to count, or behind all light, has the colour of the rest
         share = seen.weights * (opacity / counted.clamp_min(1e-6))[seen.rows]
-        off = _by_ray(seen, share * errors)
-        asked = (off > self.tolerance)[seen.rows].nonzero()[:, 0]
+        off = _by_ray(seen, (share * errors).square()).sqrt()
+        asked = (off > EXACT_SHARE * self.tolerance)[seen.rows].nonzero()[:, 0]
         if field.source is not None and len(asked):
             rgb[asked] = field.exact_colors(points[asked], along[asked])
             off[seen.rows[asked]] = 0.0
