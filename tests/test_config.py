@@ -260,6 +260,11 @@ def test_what_a_class_refuses_is_told_before_any_work() -> None:
     assert problem("loss.occupancy.delta=0") == "loss.occupancy.delta: found 0, expected more than 0 m."
 
 
+def test_labelled_points_need_a_hull() -> None:
+    message = problem("loss.occupancy.weight=0.1", "model.hull=false", "features=image")
+    assert message.startswith("model.hull: found false, but loss.occupancy reads labelled points")
+
+
 def test_settings_without_effect_are_warned_of(conf: Path) -> None:
     for option in ("image_hull", "image_hull_section", "image_hull_section_consistency"):
         with pytest.warns(UserWarning, match=rf"features={option} reads the hull, but model\.hull=false"):

@@ -12,6 +12,7 @@ from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.augmentation.stretch import Stretch, stretch
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import BatchRequest, Share
+from charnerf.data.silhouettes import SilhouetteSpace
 from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface
 from charnerf.geometry.cameras import project_into_all
@@ -36,7 +37,12 @@ def surface_of(character):
 def batch(figure_dataset):
     """A character with one raised arm."""
     store = CharacterStore(
-        root=figure_dataset, names=("lefty",), carve=carve, memory_mib=64.0, surface_of=surface_of
+        root=figure_dataset,
+        names=("lefty",),
+        carve=carve,
+        memory_mib=64.0,
+        surface_of=surface_of,
+        space_of=SilhouetteSpace,
     )
     dataset = MixedDataset(
         store=store, characters=1, foreground_share=0.75,

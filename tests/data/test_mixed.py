@@ -13,6 +13,7 @@ import torch
 from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.mixed import MixedDataset, stack_views
 from charnerf.data.sampler import BatchRequest, Share
+from charnerf.data.silhouettes import SilhouetteSpace
 from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface
 from charnerf.data.validation import ValidationDataset, spread_frames
@@ -45,6 +46,9 @@ def store_of(root: Path, *, names=NAMES, hull: bool = True, memory_mib: float = 
         carve=carve if hull else lambda _: None,
         memory_mib=memory_mib,
         surface_of=surface_of,
+        space_of=lambda character, images, hull: (
+            None if hull is None else SilhouetteSpace(character, images, hull)
+        ),
     )
 
 
@@ -173,15 +177,6 @@ def test_a_character_without_a_mesh_makes_a_batch_of_rays(tmp_path):
     store = store_of(tmp_path, names=("bare",))
     batch = dataset_of(store)[request(surface_points=30)]
     assert batch.surface is None and batch.alpha.numel() == 64
-
-
-def test_labelled_points_need_a_hull(figure_dataset):
-    store = store_of(figure_dataset, hull=False)
-    assert dataset_of(store)[request()].hull is None
-    with pytest.raises(
-        DataError, match=r"model\.hull: found false, but a term of the loss reads labelled points"
-    ):
-        dataset_of(store, needs=Needs(space_points=8))[request()]
 
 
 def test_padded_views_are_absent():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from charnerf.data.silhouettes import label_points
+from charnerf.data.silhouettes import SilhouetteSpace
 from charnerf.data.store import CharacterStore, OpenCharacter
 from charnerf.geometry.hull import build_hull, hull_contains
 from support import helpers
@@ -23,9 +23,15 @@ def ball(tmp_path_factory) -> OpenCharacter:
     return CharacterStore(root=root, names=("ball",), carve=carve, memory_mib=64).open("ball")
 
 
+def labelled(one: OpenCharacter, num_points: int, seed: int) -> tuple[torch.Tensor, torch.Tensor]:
+    space = SilhouetteSpace(one.character, one.images, one.hull)
+    drawn = space.sample(num_points, torch.Generator().manual_seed(seed))
+    return drawn.points[0], drawn.inside[0]
+
+
 def test_labels_are_right(ball):
     """Right to the precision of a pixel, inside to that of 24 silhouettes from above."""
-    points, labels = label_points(ball, 4000, torch.Generator().manual_seed(0))
+    points, labels = labelled(ball, 4000, 0)
     distance = helpers.signed_distances(helpers.ball(RADIUS), points)
     pixel = 2 * helpers.HALF_EXTENT / helpers.SIZE
     assert distance[labels == 0].min() > -0.4 * pixel  # a tenth of such a pixel may be covered
@@ -38,14 +44,14 @@ def test_labels_are_right(ball):
 
 @pytest.mark.parametrize("num_points", [1, 2, 7, 100])
 def test_both_labels_come_evenly(ball, num_points):
-    points, labels = label_points(ball, num_points, torch.Generator().manual_seed(1))
+    points, labels = labelled(ball, num_points, 1)
     assert points.shape == (num_points, 3) and labels.shape == (num_points,)
     if num_points == 100:
         assert 40 <= labels.sum() <= 60
 
 
 def test_points_go_all_through_the_ball(ball):
-    points, labels = label_points(ball, 4000, torch.Generator().manual_seed(2))
+    points, labels = labelled(ball, 4000, 2)
     inside = points[labels == 1] - torch.tensor(helpers.CENTRE)
     torch.testing.assert_close(inside.mean(0), torch.zeros(3), atol=0.06, rtol=0)
     assert (inside.norm(dim=-1) < 0.5 * RADIUS).float().mean().item() == pytest.approx(0.125, abs=0.04)
@@ -56,5 +62,5 @@ def test_a_character_that_fills_its_hull_gets_one_label(ball):
     occupancy = torch.zeros_like(ball.hull.occupancy)
     occupancy[:, 30:34, 30:34, 30:34] = True
     full = replace(ball, hull=replace(ball.hull, occupancy=occupancy))
-    points, labels = label_points(full, 50, torch.Generator().manual_seed(3))
+    points, labels = labelled(full, 50, 3)
     assert len(points) == 50 and labels.eq(1).all()

@@ -69,6 +69,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "surface_dirs": tuple(
         f"{LOSSES}.directions.{name}" for name in ("CameraDirections", "NoDirections", "RandomDirections")
     ),
+    "space": ("charnerf.data.silhouettes.SilhouetteSpace", "charnerf.data.space.SolidSpace"),
     "surface": ("charnerf.data.surface.AreaSurface", "charnerf.data.surface.VisibleSurface"),
     "augmentation": (
         f"{AUGMENTATION}.drawing.Drawing",
@@ -105,5 +106,5 @@ ARGUMENTS: Mapping[str, Mapping[str, str]] = {  # groups of the arguments that a
     "lightning.Trainer": {"profiler": "profiler", "strategy": "strategy", "plugins": "plugin"},
 }
 
-# groups whose options say `_partial_`: a run brings the last argument
-COMPLETED_LATER = ("optimizer", "surface")
+# groups whose options say `_partial_`: a run brings what it reads
+COMPLETED_LATER = ("optimizer", "space", "surface")

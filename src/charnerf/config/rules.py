@@ -75,6 +75,12 @@ def _some_term_counts(terms: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[
             yield key, f"found {weight}, expected 0 or more."
 
 
+def _labelled_points_lie_in_a_hull(weight: float, hull: bool) -> Iterator[tuple[str, str]]:
+    if weight > 0 and not hull:
+        reason = "loss.occupancy reads labelled points, expected a hull to draw them in"
+        yield "model.hull", f"found false, but {reason}; set loss.occupancy.weight=0 or model.hull=true."
+
+
 def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
     if isinstance(decay, int | float) and decay >= 1:
         yield "averaging.decay", f"found {decay}, expected below 1: at 1 the average would never move."
@@ -95,6 +101,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss",), _some_term_counts),
+    (("loss.occupancy.weight", "model.hull"), _labelled_points_lie_in_a_hull),
     (("averaging.decay",), _average_moves),
     _at_least_one("data.views"),
     _at_least_one("data.train"),

@@ -148,6 +148,7 @@ class RunConfig:
     optimization: Optimization
     averaging: Averaging
     surface_dirs: _part("surface_dirs")  # type: ignore[valid-type]
+    space: _part("space", given=["character", "images", "hull"])  # type: ignore[valid-type]
     surface: _part("surface", given=["mesh"])  # type: ignore[valid-type]
     augmentation: dict[str, _part("augmentation", given=["used_views"])]  # type: ignore[valid-type]
     loss: dict[str, _part("loss")]  # type: ignore[valid-type]

@@ -13,7 +13,7 @@ from torch.utils.data import DataLoader, Dataset
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import BatchRequest, PhaseSampler, Share
-from charnerf.data.store import CharacterStore, SurfaceOf
+from charnerf.data.store import CharacterStore, SpaceOf, SurfaceOf
 from charnerf.data.validation import ValidationDataset, ValidationView, shared_out
 from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.interruption import leave_signals_to_parent
@@ -35,6 +35,7 @@ class MixedDataModule(L.LightningDataModule):
         workers: Processes that make training batches ahead of the steps, the same batches as without; None: one where a
             GPU would wait for them, else none.
         surface_of: Makes a training character's surface.
+        space_of: Makes what a training character's labelled points are drawn from.
         make_dataset: Makes the training data set of a store, and of this process's share of every batch.
         sampler: Asks for batches.
 
@@ -54,6 +55,7 @@ class MixedDataModule(L.LightningDataModule):
         memory_mib: float,
         workers: int | None,
         surface_of: SurfaceOf,
+        space_of: SpaceOf,
         make_dataset: Callable[[CharacterStore, Share], MixedDataset],
         sampler: PhaseSampler,
     ) -> None:
@@ -67,7 +69,12 @@ class MixedDataModule(L.LightningDataModule):
         train = [name for split in train_splits for name in names_of(info, split)]
         val = names_of(info, val_split)[:val_characters]
         self.train_store = CharacterStore(
-            root=root, names=train, carve=carve, memory_mib=memory_mib, surface_of=surface_of
+            root=root,
+            names=train,
+            carve=carve,
+            memory_mib=memory_mib,
+            surface_of=surface_of,
+            space_of=space_of,
         )
         self.val_store = CharacterStore(root=root, names=val, carve=carve, memory_mib=memory_mib)
         self.workers = workers

@@ -9,9 +9,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from charnerf.data.sampler import BatchRequest, Share, step_seed
-from charnerf.data.silhouettes import label_points
 from charnerf.data.store import CharacterStore, OpenCharacter
-from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_rays
 from charnerf.losses.base import Needs
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, SpacePoints, SurfacePoints, TrainBatch
@@ -139,15 +137,9 @@ class MixedDataset(Dataset[TrainBatch]):
 
     def _space(self, one: OpenCharacter, generator: torch.Generator) -> SpacePoints | None:
         """Labelled points in the hull, None where no loss reads them."""
-        if self.needs.space_points == 0:
+        if self.needs.space_points == 0 or one.space is None:
             return None
-        if one.hull is None:
-            raise DataError(
-                "model.hull: found false, but a term of the loss reads labelled points, expected a hull to draw them in; set its "
-                "weight to 0 or model.hull=true."
-            )
-        points, inside = label_points(one, _count_each(self.needs.space_points, self.characters), generator)
-        return SpacePoints(points=points[None], inside=inside[None])
+        return one.space.sample(_count_each(self.needs.space_points, self.characters), generator)
 
 
 def stack_batches(

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import MESH_FILE
+from charnerf.data.space import AbstractSpace
 from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
 from charnerf.geometry.silhouettes import hull_silhouettes
@@ -32,6 +33,7 @@ class OpenCharacter:
         foreground: Flat indices into (N, H, W) of pixels that show the character, int32.
         background: Those of the other pixels whose rays may meet the hull, int32: of the rest there is nothing to learn.
         surface: What surface points are drawn from, None where nothing reads them or there is no mesh.
+        space: What labelled points are drawn from, None where nothing reads them.
     """
 
     character: Character
@@ -40,20 +42,28 @@ class OpenCharacter:
     foreground: Tensor
     background: Tensor
     surface: AbstractSurface | None
+    space: AbstractSpace | None
 
     @property
     def size_bytes(self) -> int:
         """Memory of the tensors."""
         hull = 0 if self.hull is None else self.hull.occupancy.numel() + 8 * self.hull.front_depths.numel()
-        surface = 0 if self.surface is None else self.surface.size_bytes
-        return self.images.numel() + 4 * (self.foreground.numel() + self.background.numel()) + hull + surface
+        drawn_from = sum(one.size_bytes for one in (self.surface, self.space) if one is not None)
+        return (
+            self.images.numel() + 4 * (self.foreground.numel() + self.background.numel()) + hull + drawn_from
+        )
 
 
 SurfaceOf = Callable[[Character], AbstractSurface | None]
+SpaceOf = Callable[[Character, Tensor, Hull | None], AbstractSpace | None]
 
 
 def no_surface(character: Character) -> None:
     """Of no character: where nothing reads surface points."""
+
+
+def no_space(character: Character, images: Tensor, hull: Hull | None) -> None:
+    """Of no character: where nothing reads labelled points."""
 
 
 @final
@@ -66,6 +76,7 @@ class CharacterStore:
         carve: Makes the hull of drawings (the model's `carve`).
         memory_mib: Bound, MiB; at least one character is always kept.
         surface_of: Makes a character's surface.
+        space_of: Makes what labelled points are drawn from, of a character's files, pictures and hull.
     """
 
     def __init__(
@@ -76,12 +87,14 @@ class CharacterStore:
         carve: Callable[[SourceViews], Hull | None],
         memory_mib: float,
         surface_of: SurfaceOf = no_surface,
+        space_of: SpaceOf = no_space,
     ) -> None:
         self.root = root
         self.names = tuple(names)
         self.carve = carve
         self.memory_bytes = memory_mib * 2**20
         self.surface_of = surface_of
+        self.space_of = space_of
         self._open: OrderedDict[str, OpenCharacter] = OrderedDict()
         self._used_bytes = 0
         self._seconds = 0.0
@@ -112,8 +125,8 @@ class CharacterStore:
         foreground = shown.reshape(-1).nonzero()[:, 0].to(torch.int32)
         near = ~shown if hull is None else hull_silhouettes(hull[0], character.cameras) & ~shown
         background = near.reshape(-1).nonzero()[:, 0].to(torch.int32)
-        surface = self.surface_of(character)
-        opened = OpenCharacter(character, images, hull, foreground, background, surface)
+        surface, space = self.surface_of(character), self.space_of(character, images, hull)
+        opened = OpenCharacter(character, images, hull, foreground, background, surface, space)
         self._seconds += perf_counter() - start
         self._open[name] = opened
         self._used_bytes += opened.size_bytes

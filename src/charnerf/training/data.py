@@ -11,7 +11,7 @@ from charnerf.data.characters import Character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import PhaseSampler, Share
-from charnerf.data.store import CharacterStore, SurfaceOf, no_surface
+from charnerf.data.store import CharacterStore, SurfaceOf, no_space, no_surface
 from charnerf.data.surface import AbstractSurface
 from charnerf.inference.build import build_part
 from charnerf.losses.base import Needs
@@ -52,6 +52,7 @@ def build_data(
         memory_mib=batches.memory_mib,
         workers=batches.workers,
         surface_of=_surface_of(cfg) if needs.surface else no_surface,
+        space_of=build_part(cfg.space) if needs.space_points else no_space,
         make_dataset=make_dataset,
         sampler=PhaseSampler(
             schedule=build_part(cfg.schedule), position=clock.position, num_marks=validation.times
