@@ -128,6 +128,9 @@ def test_a_mesh_that_fails_is_a_reason_and_no_end(figure_dataset):
 
 def test_a_prediction_of_nan_names_its_picture(figure_dataset):
     class Broken:
+        def prepared(self, scene):
+            return scene
+
         def render_camera(self, scene, camera):
             shape = (camera.height, camera.width)
             output = RenderOutput(torch.full((*shape, 3), math.nan), torch.zeros(shape), torch.zeros(shape))

@@ -129,6 +129,10 @@ class HullModel:
 class HullRenderer:
     """Draws a HullScene and counts invented work."""
 
+    def prepared(self, scene: HullScene) -> HullScene:
+        """The scene itself: nothing is kept of it."""
+        return scene
+
     def render_camera(self, scene: HullScene, camera: Cameras) -> SimpleNamespace:
         left_out = LeftOut(rays=3, rays_of=4, samples=9, samples_of=10)
         return SimpleNamespace(finest=scene.hull.render(camera), left_out=left_out)
@@ -136,6 +140,10 @@ class HullRenderer:
 
 class WhiteRenderer:
     """Draws nothing, whatever the scene."""
+
+    def prepared(self, scene: HullScene) -> HullScene:
+        """The scene itself: nothing is kept of it."""
+        return scene
 
     def render_camera(self, scene: HullScene, camera: Cameras) -> SimpleNamespace:
         shape = (camera.height, camera.width)
