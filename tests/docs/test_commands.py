@@ -61,6 +61,11 @@ EXAMPLES = [
     for name in COMMANDS
     for example in getattr(getattr(commands, name), "EXAMPLES", ())
 ]
+EXAMPLES += [
+    ("help of train", line.split("#")[0].strip())
+    for line in (ROOT / "conf" / "train.yaml").read_text(encoding="utf-8").splitlines()
+    if line.strip().startswith("python train.py")
+]
 EVERY = [*((page.name, line) for page in PAGES for line in lines_of(page)), *EXAMPLES]
 TRAINING = [line for _, line in EVERY if re.match(r"python train\.py|charnerf train", line)]
 SWEEPS = re.findall(

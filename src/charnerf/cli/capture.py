@@ -120,7 +120,6 @@ def _report(done: "CaptureReport", output: Path, split: str, began: float, json_
         say(
             f"{counted(len(done.skipped), 'character')} skipped: there from the same capture, which was interrupted."
         )
-    made = f"{counted(len(done.captured), 'character')} captured into split {split}"
     names = [*done.captured, *done.skipped]
     digest = split_digest(output, split) if names else None
     next_ = [typed("mesh", "--data", output, "--character", names[0], "-o", "meshes")] if names else []
@@ -132,8 +131,9 @@ def _report(done: "CaptureReport", output: Path, split: str, began: float, json_
         "split": split,
         "digest": digest,
     }
-    told = "" if digest is None else f"digest of {split}, the same wherever the data are the same: {digest}"
-    close(Summary(made=made, files=(output,), began=began, quality=told, next_=next_, facts=facts), json_file)
+    made = f"{counted(len(done.captured), 'character')} captured into split {split}"
+    made += "" if digest is None else f", whose digest is {digest} wherever its data are the same"
+    close(Summary(made=made, files=(output,), began=began, next_=next_, facts=facts), json_file)
     if done.failed:
         raise DataError(
             f"{counted(len(done.failed), 'mesh', 'meshes')} could not be captured:\n  "

@@ -1,6 +1,7 @@
 """What follows training: test figures, a mesh, the report."""
 
 import logging
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from charnerf.meshing.extract import vertex_colors
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
+from charnerf.reporting.formats import seconds_text
 from charnerf.reporting.run_report import write_run_report
 from charnerf.scene import Scene
 from charnerf.training.threads import ThreadTuner
@@ -83,12 +85,15 @@ def finish_run(
 
 
 def _tell(metrics: Mapping[str, Any], report: Path) -> None:
-    """Log the figures that matter most."""
+    """Log the figures that matter most, and how to go on."""
     beside = metrics["baselines"]["visual_hull"]
     log.info(
-        "Test: %.2f dB, %.2f dB on the foreground, SSIM %.3f (visual hull: %.2f, %.2f, %.3f). Report: %s",
+        "Trained for %s. Test: %.2f dB, %.2f dB on the foreground, SSIM %.3f (visual hull: %.2f, %.2f, %.3f). Report: %s. Next:"
+        " charnerf reconstruct FRONT SIDE BACK --weights %s -o DIR",
+        seconds_text(metrics["seconds"]["train"]),
         *(scores[key] for scores in (metrics, beside) for key in ("psnr", "psnr_foreground", "ssim")),
-        report,
+        report.with_suffix(".html"),
+        shlex.quote(str(report.parent)),
     )
 
 
