@@ -85,6 +85,12 @@ def inside(folder: Path, name: str, where: str) -> Path:
     )
 
 
+def user_cache() -> Path:
+    """Charnerf's folder in the user's cache: $XDG_CACHE_HOME or ~/.cache."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "charnerf"
+
+
 @contextmanager
 def write_aside(path: Path) -> Iterator[Path]:
     """A name beside `path` to write to: its file takes the place of `path` when the block ends, and goes if it raises.

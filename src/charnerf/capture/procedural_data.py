@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -24,7 +23,7 @@ from charnerf.data.layout import (
     write_dataset,
 )
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import locked
+from charnerf.files import locked, user_cache
 from charnerf.procedural import GENERATOR_VERSION, make_character
 from charnerf.progress import Progress
 
@@ -120,7 +119,7 @@ class ProceduralData(AbstractData):
             "size": size,
             "views": views,
         }
-        self._cache = Path(cache).expanduser() if cache is not None else default_cache()
+        self._cache = Path(cache).expanduser() if cache is not None else user_cache()
 
     @property
     def root(self) -> Path:
@@ -168,12 +167,6 @@ class ProceduralData(AbstractData):
             and all((root / name).is_dir() for name in splits.get(split, ()))
             for split in SPLITS
         )
-
-
-def default_cache() -> Path:
-    """Charnerf's folder in the user's cache: $XDG_CACHE_HOME or ~/.cache."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "charnerf"
 
 
 def _check_numbers(counts: dict[str, int], *, views: int, size: int) -> None:

@@ -82,6 +82,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "data": (
         "charnerf.capture.procedural_data.ProceduralData",
         "charnerf.data.folder.FolderData",
+        "charnerf.data.shards_data.ShardsData",
         "charnerf.foreign.data.ForeignData",
     ),
     "optimizer": (

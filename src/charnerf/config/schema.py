@@ -65,6 +65,8 @@ class Batches:
 
     foreground_share: Share
     memory_mib: Annotated[float, Above(0)]
+    window: Count | None
+    window_steps: Count
     workers: CountOrZero | None
 
 

@@ -13,6 +13,7 @@ from PIL import Image
 from torch import Tensor
 
 from charnerf.data.layout import MESH_FILE, TRANSFORMS_FILE, check_name, read_dataset
+from charnerf.data.shards import bring, is_cache
 from charnerf.data.transforms import read_transforms, transforms_text
 from charnerf.errors import DataError
 from charnerf.files import inside
@@ -130,6 +131,8 @@ def load_character(root: str | Path, name: str, *, num_sources: int = 1) -> Char
     """
     check_name("character", name)
     folder = Path(root) / name
+    if is_cache(Path(root)):
+        bring(Path(root), name)
     if not folder.is_dir():
         raise _absent(Path(root), name)
     files = read_transforms(folder)

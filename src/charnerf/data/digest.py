@@ -5,6 +5,7 @@ from pathlib import Path
 
 from charnerf.data.characters import read_rgba
 from charnerf.data.layout import TRANSFORMS_FILE, names_of, read_dataset
+from charnerf.data.shards import is_cache, read_index_once
 from charnerf.data.transforms import read_transforms
 
 DIGITS = 16
@@ -38,6 +39,10 @@ def training_digest(root: str | Path, split: str) -> str:
     Raises:
         DataError: If the split is empty or a file is missing or unreadable.
     """
+    if is_cache(Path(root)):
+        return read_index_once(Path(root)).digests[
+            split
+        ]  # written when it was packed; its shards are held to their own
     digest = hashlib.sha256(split_digest(root, split).encode())
     for name in names_of(read_dataset(root), split):
         digest.update((Path(root) / name / TRANSFORMS_FILE).read_bytes())

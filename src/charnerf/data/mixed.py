@@ -10,6 +10,7 @@ from torch.utils.data import Dataset
 
 from charnerf.data.sampler import BatchRequest, Share, step_seed
 from charnerf.data.store import CharacterStore, OpenCharacter
+from charnerf.data.window import Window
 from charnerf.geometry.cameras import pixel_rays
 from charnerf.losses.base import Needs
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews, SpacePoints, SurfacePoints, TrainBatch
@@ -29,6 +30,7 @@ class MixedDataset(Dataset[TrainBatch]):
         augmentation: Changes a character's batch at random.
         seed: Of the run.
         share: Of every step's batch, which this process makes.
+        window: Which characters a step draws from; all of them without.
     """
 
     def __init__(
@@ -42,6 +44,7 @@ class MixedDataset(Dataset[TrainBatch]):
         augmentation: Callable[[TrainBatch, torch.Generator], TrainBatch],
         seed: int,
         share: Share,
+        window: Window | None = None,
     ) -> None:
         self.store = store
         self.characters = min(characters, len(store))
@@ -51,6 +54,7 @@ class MixedDataset(Dataset[TrainBatch]):
         self.augmentation = augmentation
         self.seed = seed
         self.share = share
+        self.window = window
 
     def __getitem__(self, request: BatchRequest) -> TrainBatch:  # type: ignore[override]
         """Make this process's share of the batch of a request; the same request makes the same batch.
@@ -72,9 +76,10 @@ class MixedDataset(Dataset[TrainBatch]):
     def _choose(self, step: int) -> list[str]:
         """Characters of a step, of all processes; the same one again only where there are too few."""
         generator = torch.Generator().manual_seed(step_seed(self.seed, step))
-        wanted, there = self.characters * self.share.processes, len(self.store)
+        names = self.store.names if self.window is None else self.window.names(step)
+        wanted, there = self.characters * self.share.processes, len(names)
         orders = [torch.randperm(there, generator=generator) for _ in range(-(-wanted // there))]
-        return [self.store.names[int(index)] for index in torch.cat(orders)[:wanted]]
+        return [names[int(index)] for index in torch.cat(orders)[:wanted]]
 
     def _alone(self, name: str, seed: int, request: BatchRequest, surface_points: int) -> TrainBatch:
         """A batch of one character."""

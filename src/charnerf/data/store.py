@@ -13,6 +13,7 @@ from torch import Tensor
 
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import MESH_FILE
+from charnerf.data.shards import is_cache, read_index_once
 from charnerf.data.space import AbstractSpace
 from charnerf.data.surface import AbstractSurface
 from charnerf.errors import DataError
@@ -106,6 +107,8 @@ class CharacterStore:
 
     def has_mesh(self, name: str) -> bool:
         """Whether a character has a mesh, without opening it."""
+        if is_cache(self.root):
+            return name in read_index_once(self.root).with_mesh
         return (self.root / name / MESH_FILE).is_file()
 
     def open(self, name: str) -> OpenCharacter:
@@ -144,6 +147,7 @@ class CharacterStore:
         needed = self._used_bytes / opened * wanted / 2**20
         log.warning(
             "batches.memory_mib=%.0f holds about %d of %d characters; the others are opened anew at each turn, %.2f s each. "
-            "batches.memory_mib=%.0f would hold all; batches.workers=1 opens them beside the training.",
-            self.memory_bytes / 2**20, max(opened - 1, 1), wanted, self._seconds / opened, 1.05 * needed,
+            "batches.memory_mib=%.0f would hold all; batches.window=%d draws from as many as fit, exchanged one by one;"
+            " batches.workers=1 opens them beside the training.",
+            self.memory_bytes / 2**20, max(opened - 1, 1), wanted, self._seconds / opened, 1.05 * needed, max(opened - 2, 1),
         )  # fmt: skip

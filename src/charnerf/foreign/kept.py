@@ -10,11 +10,10 @@ from pathlib import Path
 from tqdm import tqdm
 
 from charnerf.capture.parallel import in_processes
-from charnerf.capture.procedural_data import default_cache
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import DATASET_FILE, DatasetInfo, write_dataset
 from charnerf.errors import CharNeRFError, DataError
-from charnerf.files import locked, write_text
+from charnerf.files import locked, user_cache, write_text
 from charnerf.foreign.base import AbstractFormat, Found
 from charnerf.foreign.co3d import Co3d
 from charnerf.foreign.convert import converted
@@ -77,7 +76,7 @@ def kept_copy(
         DataError: If it is of no format, or characters can not be read: all of them are named, the others are kept.
     """
     form, found = recognised(root)
-    home = (cache or default_cache()) / _folder_name(root, reading)
+    home = (cache or user_cache()) / _folder_name(root, reading)
     home.mkdir(parents=True, exist_ok=True)
     with locked(home / _LOCK):  # one process reads, others wait
         remove_partial_characters(home)

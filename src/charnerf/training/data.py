@@ -1,7 +1,7 @@
 """The data of a run: its splits, and a datamodule that opens what the loss needs."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from omegaconf import DictConfig
@@ -11,8 +11,10 @@ from charnerf.data.characters import Character
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import PhaseSampler, Share
+from charnerf.data.shards import is_cache, read_index_once
 from charnerf.data.store import CharacterStore, SurfaceOf, no_space, no_surface
 from charnerf.data.surface import AbstractSurface
+from charnerf.data.window import Window, groups_of
 from charnerf.inference.build import build_part
 from charnerf.losses.base import Needs
 from charnerf.models.charnerf import CharNeRF
@@ -40,6 +42,7 @@ def build_data(
             ),
             seed=cfg.seed,
             share=share,
+            window=_window(root, store.names, batches, seed=cfg.seed),
         )
 
     return MixedDataModule(
@@ -57,6 +60,21 @@ def build_data(
         sampler=PhaseSampler(
             schedule=build_part(cfg.schedule), position=clock.position, num_marks=validation.times
         ),
+    )
+
+
+def _window(root: Path, names: Sequence[str], batches: DictConfig, *, seed: int) -> Window | None:
+    """What training draws from where the config says how many at a time; shards come and go whole."""
+    if batches.window is None or batches.window >= len(names):
+        return None
+    shards = [shard.names for shard in read_index_once(root).shards] if is_cache(root) else None
+    groups = groups_of(names, shards)
+    each = len(names) / len(groups)
+    return Window(
+        groups,
+        held=max(1, round(batches.window / each)),
+        steps=max(1, round(batches.window_steps * each)),
+        seed=seed,
     )
 
 
