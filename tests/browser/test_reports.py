@@ -1,7 +1,9 @@
 """The reports in a real browser: of a reconstruction, of a run and of a grid, each alone in a folder."""
 
 import io
+import json
 import shutil
+import struct
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +17,9 @@ from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.meshing.export import save_mesh
 from charnerf.reconstruction.folder import reconstruct
+from charnerf.reporting.blocks import Mesh
 from charnerf.reporting.folder_report import write_folder_report
+from charnerf.reporting.page import to_html
 from charnerf.reporting.run_report import write_run_report
 from support.egg_model import OPTIONS, FakeModel, draw_eggs
 from support.figures import HullModel, HullRenderer, write_figure
@@ -141,3 +145,19 @@ def test_where_nothing_draws_in_3d_it_is_said(reports, open_page):
     opened.page.goto(reports["run"].as_uri())
     opened.page.locator("charnerf-mesh").scroll_into_view_if_needed()
     opened.page.get_by_text("This browser shows no 3D").wait_for()
+
+
+def test_a_strangers_mesh_calls_nobody(tmp_path, open_page):
+    """Its picture lies on another machine, so it says: it is drawn without."""
+    header = json.loads(save_mesh(_painted(), tmp_path / "ball.gltf").read_text())
+    header["images"] = [{"uri": "http://127.0.0.1:9/spy.png"}]
+    header["textures"] = [{"source": 0}]
+    header["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<II", len(text), 0x4E4F534A) + text  # one chunk: its buffers are data addresses
+    (tmp_path / "ball.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk)
+    (tmp_path / "report.html").write_text(to_html("a mesh", [Mesh(tmp_path / "ball.glb", "a mesh")]))
+    opened = open_page(tmp_path / "report.html")
+    assert drawn(opened.page).std() > 5.0
+    assert opened.requests == []

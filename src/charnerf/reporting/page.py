@@ -28,6 +28,10 @@ from charnerf.reporting.blocks import (
 from charnerf.viewer.element import mesh_element, viewer_script
 
 WIDE = 1.6  # width over height of a picture that is more than one
+ALONE = (  # whatever a report shows, the browser asks nobody for anything
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; media-src data:;"
+    " connect-src data: blob:"
+)
 MOST_MESH = 16 * 2**20  # bytes of a mesh that stands in a page itself
 
 
@@ -181,6 +185,7 @@ def to_html(title: str, blocks: Sequence[Block]) -> str:
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{ALONE}">\n'
         f"<title>{html.escape(title)}</title>\n<style>{_page_file('page.css')}</style>\n</head>\n"
         f"<body>\n<main>\n{body}\n</main>\n{''.join(scripts)}</body>\n</html>\n"
     )

@@ -4,8 +4,8 @@
 // fetched but src. The GPU is used only while the element is on the screen; frames are drawn only when something has changed.
 
 import {
-  AmbientLight, Box3, DirectionalLight, DoubleSide, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Scene, Sphere,
-  WebGLRenderer,
+  AmbientLight, Box3, DirectionalLight, DoubleSide, LoadingManager, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera,
+  Scene, Sphere, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -99,7 +99,9 @@ class MeshElement extends HTMLElement {
 
   /** Read the mesh: its scene with the camera and its light, and its materials by kind. */
   async load() {
-    const { scene: model } = await new GLTFLoader().parseAsync(await this.bytes(), "");
+    const manager = new LoadingManager();
+    manager.setURLModifier((url) => (/^(blob|data):/.test(url) ? url : "data:,")); // a mesh calls nobody
+    const { scene: model } = await new GLTFLoader(manager).parseAsync(await this.bytes(), "");
     const meshes = [];
     model.traverse((each) => each.isMesh && meshes.push(each));
     if (!meshes.length) throw new Error("it holds no surface.");
