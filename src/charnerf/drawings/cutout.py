@@ -3,13 +3,15 @@
 Letters: H, W of the drawing as read.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
 from skimage.measure import label
 
 from charnerf.drawings.background import Background, find_background
+from charnerf.drawings.enclosed import Gap, find_gaps
 from charnerf.drawings.load import Drawing
 from charnerf.drawings.surroundings import (
     count_figures,
@@ -35,10 +37,14 @@ class Cutout:
     Attributes:
         rgba: (H, W, 4), float32 in [0, 1], straight alpha; colours of the outline freed from the background.
         notes: What was done and what is doubtful, sentences.
+        drawn: The drawing on white as it was cut out of its paper, (H, W, 3); None where its alpha did that.
+        gaps: Regions of paper that the figure encloses, which may be seen through.
     """
 
     rgba: np.ndarray
     notes: tuple[str, ...]
+    drawn: np.ndarray | None = None
+    gaps: tuple[Gap, ...] = ()
 
 
 def cut_out(drawing: Drawing) -> Cutout:
@@ -47,11 +53,13 @@ def cut_out(drawing: Drawing) -> Cutout:
     Alpha is used where it carries information. Otherwise the background's colour is read off the border (with
     a slow gradient, as paper has), everything of that colour that is connected to the border goes, and the
     outline gets soft alpha. A frame around the picture and a shadow on the ground go too. Regions of background
-    colour that the figure encloses stay: they are more often white clothes than holes.
+    colour that the figure encloses stay, and are listed: whether they are gaps, another view tells (`see_through`).
 
     Raises:
         DataError: If the border is not plain, no figure remains, or several of one size do.
     """
+    gaps: tuple[Gap, ...] = ()
+    drawn = None
     if has_alpha(drawing.rgba[..., 3]):
         rgba, notes = drawing.rgba.copy(), ["cut out by its alpha"]
         shadow = shadow_by_alpha(rgba)
@@ -60,7 +68,8 @@ def cut_out(drawing: Drawing) -> Cutout:
             rgba[..., 3] *= ~shadow
         rgba[..., 3] *= _without_specks(rgba[..., 3] > 0.5, notes, margin=2)
     else:
-        rgba, notes = _by_background(drawing)
+        drawn, mask, gaps, notes = _by_background(drawing)
+        rgba = _soft_outline(drawn, mask)
     figure = rgba[..., 3] > 0.5
     count = count_figures(figure)
     if count > 1:
@@ -80,7 +89,17 @@ def cut_out(drawing: Drawing) -> Cutout:
         notes.append(
             f"the figure touches the picture's {', '.join(touched)} edge: if it is cropped, draw it whole"
         )
-    return Cutout(rgba, tuple(notes))
+    return Cutout(rgba, tuple(notes), drawn, gaps)
+
+
+def see_through(cutout: Cutout, gaps: Sequence[Gap]) -> Cutout:
+    """A figure whose gaps are clear, with soft outlines around them; as it is without any."""
+    if cutout.drawn is None or not gaps:
+        return cutout
+    open_ = np.any([gap.mask for gap in gaps], axis=0)
+    note = f"{len(gaps)} enclosed {'gap' if len(gaps) == 1 else 'gaps'} of paper seen through"
+    figure = (cutout.rgba[..., 3] > 0.5) & ~open_
+    return replace(cutout, rgba=_soft_outline(cutout.drawn, figure), notes=(*cutout.notes, note))
 
 
 def has_alpha(alpha: np.ndarray) -> bool:
@@ -89,8 +108,8 @@ def has_alpha(alpha: np.ndarray) -> bool:
     return ALPHA_SHARE < clear < 1.0 - 1e-4
 
 
-def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
-    """Cut out a figure from the background that its border shows."""
+def _by_background(drawing: Drawing) -> tuple[np.ndarray, np.ndarray, tuple[Gap, ...], list[str]]:
+    """The drawing on white (H, W, 3), what of it is figure by the background that its border shows, gaps in it, and notes."""
     notes: list[str] = []
     background = find_background(drawing)
     figure = ~background.mask
@@ -118,7 +137,7 @@ def _by_background(drawing: Drawing) -> tuple[np.ndarray, list[str]]:
         notes.append(SHADOW_NOTE)
         figure &= ~(shadow | _fenced_in(background, figure, shadow))
     figure = _without_specks(figure, notes, margin=0)
-    return _soft_outline(on_white(drawing.rgba), figure), notes
+    return on_white(drawing.rgba), figure, find_gaps(background, figure), notes
 
 
 def _fenced_in(background: Background, figure: np.ndarray, shadow: np.ndarray) -> np.ndarray:

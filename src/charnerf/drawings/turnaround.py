@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from charnerf.drawings.align import FigureBox, figure_box, half_extent, place
-from charnerf.drawings.cutout import Cutout, cut_out
+from charnerf.drawings.cutout import Cutout, cut_out, see_through
+from charnerf.drawings.enclosed import shared
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.options import ReadingOptions
@@ -81,7 +82,7 @@ def read_views(
     if size < 16:
         raise DataError(f"size: found {size}, expected at least 16 pixels.")
     _check_viewpoints(drawings)
-    figures = [_prepare(viewpoint, source) for viewpoint, source in drawings.items()]
+    figures = _without_gaps([_prepare(viewpoint, source) for viewpoint, source in drawings.items()])
     options = options or ReadingOptions()
     figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
@@ -172,6 +173,24 @@ def _prepare(viewpoint: Viewpoint, source: Picture) -> _Figure:
         drawing = load_drawing(source)
     cutout = cut_out(drawing)
     return _Figure(viewpoint, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
+
+
+def _without_gaps(figures: Sequence[_Figure]) -> list[_Figure]:
+    """The figures seen through where they and the opposite view enclose paper at mirrored places."""
+    opened = list(figures)
+    for first, second in combinations(range(len(figures)), 2):
+        if not _are_opposite(figures[first].viewpoint, figures[second].viewpoint):
+            continue
+        both = shared(figures[first].cutout.gaps, figures[second].cutout.gaps)
+        for index, gaps in zip((first, second), both, strict=True):
+            opened[index] = replace(opened[index], cutout=see_through(opened[index].cutout, gaps))
+    return opened
+
+
+def _are_opposite(one: Viewpoint, other: Viewpoint) -> bool:
+    """Whether two level views mirror each other's outlines."""
+    apart = (one.azimuth_deg - other.azimuth_deg) % 360.0
+    return abs(apart - 180.0) < NEAR and one.elevation_deg == other.elevation_deg == 0.0
 
 
 def _without_ink(figures: Sequence[_Figure]) -> tuple[list[_Figure], tuple[str, ...]]:
