@@ -25,7 +25,8 @@ from support import helpers
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*pages(), ROOT / ".github" / "CONTRIBUTING.md"]
-COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+DOOR = typer.main.get_command(app)
+COMMANDS = DOOR.commands  # type: ignore[attr-defined]
 ELSEWHERE = (
     "pip",
     "venv",
@@ -210,7 +211,8 @@ def _flat(content: object, before: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
 def test_every_key_option_and_path_is_there(page: Path, keys: set[str]) -> None:
-    options = {name for command in COMMANDS.values() for one in command.params for name in one.opts}
+    options = {name for command in (DOOR, *COMMANDS.values()) for one in command.params for name in one.opts}
+    options.add("--help")
     for text in inline(page):
         for word in text.split():
             key, is_value, value = word.lstrip("+'").partition("=")

@@ -1,5 +1,7 @@
 """Drawings of a known character can be read back as drawings, and stand where the character stands."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -14,8 +16,9 @@ from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawin
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.redrawn import VIEW_SHARES, redrawn, with_drawn_sources
 from charnerf.drawings.turnaround import read_views
-from charnerf.drawings.viewpoints import turnaround
-from charnerf.errors import ConfigError
+from charnerf.drawings.viewpoints import turnaround, viewpoint
+from charnerf.errors import ConfigError, DataError
+from charnerf.reconciling.agreement import iou
 from charnerf.surfaces.mesh_files import load_surface_mesh
 
 AS_DRAWN = ReadingOptions(reconciled=False)
@@ -83,6 +86,18 @@ def test_a_redrawn_character_keeps_its_truth(character):
     assert torch.equal(back, front.flip(-1)), "reconciled: the back takes the mirrored front's outline"
     loose = redrawn(character, level=2, seed=0, size=64, options=AS_DRAWN).sources.images[0]
     assert not torch.equal(loose[2, 3], loose[0, 3].flip(-1))
+
+
+def test_other_views_are_drawn_of_the_mesh(character):
+    """In the order given, the first of which rules; of the left one the picture that was captured, but for paper and framing."""
+    views = [viewpoint(name) for name in ("left", "front", "right", "45")]
+    again = redrawn(character, level=0, seed=0, size=64, views=views)
+    assert again.source_names == ("side", "front", "right", "three-quarter-front")
+    assert again.sources.images.shape == (1, 4, 4, 64, 64)
+    left, front, right = again.sources.images[0, :3, 3]
+    assert iou(left.numpy(), right.flip(-1).numpy()) > 0.9 > iou(left.numpy(), front.numpy())
+    with pytest.raises(DataError, match=r"found no mesh to draw right.*captured views"):
+        redrawn(replace(character, mesh_file=None), level=1, seed=0, size=64, views=[viewpoint("right")])
 
 
 def test_training_characters_get_drawings_of_some_usual_views(character, figure_dataset, tmp_path):

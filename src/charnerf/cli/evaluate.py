@@ -67,6 +67,15 @@ Drawn = Annotated[
         help="Draw the source views anew, disagreeing: 1 in place and size, 2 limbs off by 10 degrees, 3 by 30 degrees.",
     ),
 ]
+SourcesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--sources",
+        metavar="VIEWS",
+        help="Source views that the model gets, such as front,left or front,left,back,45, drawn of the characters' meshes; the"
+        " captured ones if left out.",
+    ),
+]
 NearestFrom = Annotated[
     list[str] | None,
     typer.Option(
@@ -93,6 +102,7 @@ def command(
     baselines: Baselines = True,
     nearest_from: NearestFrom = None,
     drawn: Drawn = None,
+    sources: SourcesOption = None,
     reading: ReadingOptions,
     device: Device = "auto",
     trust: Trusted = None,
@@ -102,14 +112,13 @@ def command(
     Prints metrics.json.
     """
     began, num_views = time.perf_counter(), _number_of_views(views)
-    if resolution is not None:
-        MeshOptions(resolution=resolution)
-    from charnerf.evaluation.evaluate import as_captured, evaluate
+    from charnerf.evaluation.evaluate import evaluate
     from charnerf.evaluation.nearest import TrainingCharacters
     from charnerf.inference.weights import run_folder
     from charnerf.meshing.build import build_mesh
 
-    _check_folders(output, json_file)
+    source_drawer = _source_drawer(drawn, sources, reading)
+    _check(output, json_file, resolution)
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
     run_views, run_resolution = _measured_by(run)
@@ -125,14 +134,16 @@ def command(
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=_train_seconds(run),
-        redrawn=as_captured if drawn is None else _redrawn(drawn, model.image_size, reading),
+        redrawn=source_drawer(model.image_size),
     )
     _write(metrics, output, json_file, began)
     typer.echo(json.dumps(metrics, indent=2))
 
 
-def _check_folders(output: Path | None, json_file: Path | None) -> None:
-    """Check, before any work, that what is measured can be written."""
+def _check(output: Path | None, json_file: Path | None, resolution: int | None) -> None:
+    """Check, before any work, that meshes can be made and what is measured can be written."""
+    if resolution is not None:
+        MeshOptions(resolution=resolution)
     for folder in (output, json_file.parent if json_file else None):
         if folder is not None:
             check_folder(folder)
@@ -165,14 +176,25 @@ def _number_of_views(text: str | None) -> int | Literal["all"] | None:
     return int(text)
 
 
-def _redrawn(text: str, size: int, reading: ReadingOptions) -> "Callable[[Character], Character]":
-    """What draws the source views of LEVEL[:SEED]."""
+def _source_drawer(
+    drawn: str | None, sources: str | None, reading: ReadingOptions
+) -> "Callable[[int], Callable[[Character], Character]]":
+    """What draws source views at LEVEL[:SEED], of a size, where any are to be drawn."""
     from charnerf.drawings.redrawn import redrawn
+    from charnerf.drawings.viewpoints import viewpoint
+    from charnerf.evaluation.evaluate import as_captured
 
-    level, _, seed = text.partition(":")
+    if drawn is None and sources is None:
+        return lambda size: as_captured
+    level, _, seed = (drawn or "0").partition(":")
     if not is_count(level) or not (is_count(seed, most=2**63) or not seed):
-        raise ConfigError(f"--drawn: found '{text[:60]}', expected LEVEL or LEVEL:SEED, such as 2 or 2:7.")
-    return partial(redrawn, level=int(level), seed=int(seed or 0), size=size, options=reading)
+        raise ConfigError(
+            f"--drawn: found '{(drawn or '')[:60]}', expected LEVEL or LEVEL:SEED, such as 2 or 2:7."
+        )
+    views = None if sources is None else [viewpoint(name.strip()) for name in sources.split(",")]
+    return lambda size: partial(
+        redrawn, level=int(level), seed=int(seed or 0), size=size, views=views, options=reading
+    )
 
 
 def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:

@@ -1,7 +1,7 @@
 """Drawings of a data set's characters: what somebody would have drawn of them, on paper."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from charnerf.capture.character import capture_sources
 from charnerf.capture.poses import find_joints, random_pose, reposed
 from charnerf.data.characters import Character
 from charnerf.data.drawing_style import draw_pictures, random_style
-from charnerf.errors import ConfigError
-from charnerf.geometry.framing import SOURCE_AZIMUTHS, SOURCE_ORDER
+from charnerf.errors import ConfigError, DataError
+from charnerf.geometry.framing import SOURCE_AZIMUTHS
 from charnerf.pictures import save_png, to_bytes
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.surface_mesh import SurfaceMesh
@@ -54,7 +54,14 @@ One hand draws all levels: how steadily lines are drawn is a matter of the artis
 """
 
 
-def draw_character(character: Character, *, size: int, seed: int, level: int = 1) -> dict[str, np.ndarray]:
+def draw_character(
+    character: Character,
+    *,
+    size: int,
+    seed: int,
+    level: int = 1,
+    azimuths_deg: Mapping[str, float] = SOURCE_AZIMUTHS,
+) -> dict[str, np.ndarray]:
     """Draw a character in one style for all views, each view with mistakes of its own.
 
     Args:
@@ -62,12 +69,14 @@ def draw_character(character: Character, *, size: int, seed: int, level: int = 1
         size: Side of the drawings, pixels.
         seed: Of the style and of the hand; another character has another style at the same seed.
         level: Of disagreement, index into LEVELS; at 0 views are captured and neither inked nor moved.
+        azimuths_deg: From where it is drawn, by the names that the views get; the first rules.
 
     Returns:
         RGB uint8 (size, size, 3) on paper, by the name of the view.
 
     Raises:
         ConfigError: If there is no such level.
+        DataError: If other views are asked of a character without a mesh.
     """
     if not 0 <= level < len(LEVELS):
         raise ConfigError(f"level: found {level}, expected 0 to {len(LEVELS) - 1}.")
@@ -75,11 +84,16 @@ def draw_character(character: Character, *, size: int, seed: int, level: int = 1
     digest = hashlib.sha256(f"{seed} {character.name}".encode()).digest()
     rng = np.random.default_rng(int.from_bytes(digest[7:15], "little"))
     if character.mesh_file is None:
+        if azimuths_deg is not SOURCE_AZIMUTHS:
+            raise DataError(
+                f"{character.folder}: found no mesh to draw {', '.join(azimuths_deg)} of; capture the character again, or take its"
+                " captured views."
+            )
         names, images = character.source_names, character.sources.images[0]
     else:
-        names = SOURCE_ORDER
+        names = tuple(azimuths_deg)
         surface = load_surface_mesh(character.mesh_file)
-        images = captured(surface, tuple(SOURCE_AZIMUTHS.values()), size=size, mistakes=mistakes, rng=rng)
+        images = captured(surface, tuple(azimuths_deg.values()), size=size, mistakes=mistakes, rng=rng)
     pixels = on_paper(images, mistakes, seed=int.from_bytes(digest[:7], "little"))
     return dict(zip(names, pixels, strict=True))
 

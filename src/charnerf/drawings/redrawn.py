@@ -1,5 +1,6 @@
 """A character whose source views are drawn, as somebody would, and read as drawings are: what is measured with known truth."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,26 +25,40 @@ VIEW_SHARES = {  # of training's turnarounds, by the views that they have
 
 
 def redrawn(
-    character: Character, *, level: int, seed: int, size: int, options: ReadingOptions | None = None
+    character: Character,
+    *,
+    level: int,
+    seed: int,
+    size: int,
+    views: Sequence[Viewpoint] | None = None,
+    options: ReadingOptions | None = None,
 ) -> Character:
-    """Draw a character's front, side and back at a level of disagreement, and take the drawings for its source views.
+    """Draw views of a character at a level of disagreement, and take the drawings for its source views.
 
     Args:
         character: With its mesh.
-        level: As of `artist.draw_character`; at 0 it is returned as it is.
+        level: As of `artist.draw_character`.
         seed: Of the artist.
         size: Side of the source views, pixels.
+        views: Level ones; None for front, left and back. At level 0 these are returned as they were captured.
         options: How the drawings are read.
 
     Raises:
         ConfigError: If there is no such level.
-        DataError: If a drawing can not be read.
+        DataError: If a drawing can not be read, or there is no mesh to draw further views of.
     """
-    if level == 0:
-        return character
-    front, side, back = draw_character(character, size=SIDE, seed=seed, level=level).values()
-    read = read_views(turnaround(front, side, back), size=size, options=options)
-    return replace(character, sources=read.views)
+    if views is None:
+        if level == 0:
+            return character
+        front, side, back = draw_character(character, size=SIDE, seed=seed, level=level).values()
+        drawings = turnaround(front, side, back)
+    else:
+        azimuths = {_stored_name(view): view.azimuth_deg for view in views}
+        drawn = draw_character(character, size=SIDE, seed=seed, level=level, azimuths_deg=azimuths)
+        drawings = dict(zip(views, drawn.values(), strict=True))
+    read = read_views(drawings, size=size, options=options)
+    names = tuple(_stored_name(view) for view in drawings)
+    return replace(character, sources=read.views, source_names=names)
 
 
 def with_drawn_sources(
