@@ -17,7 +17,7 @@ from charnerf.config.composition import compose_config
 from charnerf.errors import ConfigError
 from charnerf.inference.checkpoint_file import read_checkpoint
 from charnerf.training.cells import cells_of
-from charnerf.training.processes import processes_to_begin
+from charnerf.training.processes import check_alone, processes_to_begin
 
 TWO = ("trainer=ddp", "trainer.accelerator=cpu", "trainer.devices=2")
 FEW = ("encoder=single", "scale.eval_views=1", "validation.views=3")
@@ -99,6 +99,42 @@ def test_only_what_asks_for_processes_begins_them(figure_dataset):
         count(*TWO, "+trainer.num_nodes=2")
     with pytest.raises(ConfigError, match=r"trainer\.strategy: found ddp_spawn, expected ddp"):
         count(*TWO, "trainer.strategy=ddp_spawn")
+
+
+def test_a_queue_s_one_task_begins_them_and_a_started_team_none(figure_dataset, monkeypatch):
+    """Within a job of SLURM with one task the command begins them; where each has its own, no grid may begin."""
+    cfg = compose_config(["data=folder", f"data.root={figure_dataset}", *TWO])
+    job = {"NTASKS": "1", "JOB_ID": "7", "JOB_NAME": "mine", "PROCID": "0", "LOCALID": "0", "NODEID": "0"}
+    with monkeypatch.context() as slurm:
+        for key, value in job.items():
+            slurm.setenv(f"SLURM_{key}", value)
+        assert processes_to_begin(cfg) == 2
+        check_alone(cfg)
+    monkeypatch.setenv("LOCAL_RANK", "0")
+    assert processes_to_begin(cfg) == 1
+    with pytest.raises(ConfigError, match=r"-m: found several processes"):
+        check_alone(cfg)
+
+
+@pytest.mark.slow
+def test_processes_that_torchrun_begins_make_one_run(figure_dataset, tmp_path):
+    launcher = [
+        sys.executable,
+        "-m",
+        "torch.distributed.run",
+        "--nproc-per-node",
+        "2",
+        "-m",
+        "charnerf",
+        "train",
+    ]
+    data = ["scale=smoke", "data=folder", f"data.root={figure_dataset}", f"hydra.run.dir={tmp_path / 'run'}"]
+    done = subprocess.run([*launcher, *data, *FEW, *TWO], capture_output=True, text=True, check=False)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, said
+    assert said.count("Report: ") == 1 and rows(tmp_path / "run")[-1]["rays"] == 128
+    again = subprocess.run([*launcher, *data, *FEW, *TWO], capture_output=True, text=True, check=False)
+    assert again.returncode != 0 and "holds a run already" in again.stdout + again.stderr
 
 
 @pytest.mark.slow

@@ -129,6 +129,7 @@ def _run_job(cfg: "DictConfig") -> None:
     from charnerf.config.job_files import save_job
     from charnerf.config.overrides import trusted_by
     from charnerf.training.cells import run_cell
+    from charnerf.training.processes import check_alone
     from charnerf.training.run import run_training
 
     job = HydraConfig.get()
@@ -136,6 +137,7 @@ def _run_job(cfg: "DictConfig") -> None:
     folder = Path(job.runtime.output_dir)
     train = partial(run_training, begin_process=_begin_process)
     if job.mode is RunMode.MULTIRUN:
+        check_alone(cfg)
         run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder, train=train)
     else:
         train(cfg, folder, accepted=partial(save_job, folder, cfg))

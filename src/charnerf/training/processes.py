@@ -12,7 +12,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from logging.handlers import QueueHandler, QueueListener
 from multiprocessing.connection import Connection, wait
@@ -28,10 +28,10 @@ from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.inference.build import build_part
 from charnerf.interruption import SIGNALS, Stopped, end_with_parent, listening, requested
 from charnerf.progress import reported_to
+from charnerf.training.trainer import environment
 
 TICK = 0.5  # seconds between two looks at whether a signal has come
 PATIENCE = 10.0  # seconds for the others to end by themselves when one has failed
-QUIET = {"logger": False, "enable_checkpointing": False, "enable_progress_bar": False}
 BEGIN_OTHERWISE = ("spawn", "fork", "notebook")  # parts of the names of Lightning's strategies
 
 
@@ -41,9 +41,8 @@ def processes_to_begin(cfg: DictConfig) -> int:
     Raises:
         ConfigError: If they are to be on several machines, or to begin in other ways.
     """
-    trainer: L.Trainer = build_part(cfg.trainer, {**QUIET, "enable_model_summary": False})
-    environment = getattr(trainer.strategy, "cluster_environment", None)
-    if trainer.world_size == 1 or environment is None or environment.creates_processes_externally:
+    trainer = _trainer(cfg)
+    if trainer.world_size == 1 or environment().creates_processes_externally:
         return 1
     if trainer.num_nodes > 1:
         raise ConfigError(
@@ -53,6 +52,55 @@ def processes_to_begin(cfg: DictConfig) -> int:
     if any(part in str(cfg.trainer.get("strategy")) for part in BEGIN_OTHERWISE):
         raise ConfigError(f"trainer.strategy: found {cfg.trainer.strategy}, expected ddp.")
     return trainer.num_devices
+
+
+def meet(cfg: DictConfig) -> Share:
+    """Meet the other processes that srun or torchrun has begun for a training, if it has.
+
+    Returns:
+        This process's place among them.
+    """
+    trainer = _trainer(cfg)
+    share = Share(trainer.global_rank, trainer.world_size)
+    if share.processes > 1:
+        trainer.strategy.setup_environment()
+    return share
+
+
+def check_alone(cfg: DictConfig) -> None:
+    """Check that srun or torchrun has not begun several processes for a grid: each would begin the next cell.
+
+    Raises:
+        ConfigError: If it has.
+    """
+    if processes_to_begin(cfg) == 1 and _trainer(cfg).world_size > 1:
+        raise ConfigError(
+            "-m: found several processes that srun or torchrun has begun, expected one: a grid begins those of each cell itself, by"
+            " trainer=ddp; with hydra/launcher=submitit_slurm set hydra.launcher.tasks_per_node=1."
+        )
+
+
+def _trainer(cfg: DictConfig) -> L.Trainer:
+    """Lightning's trainer, to ask what it would begin."""
+    quiet = dict.fromkeys(
+        ("logger", "enable_checkpointing", "enable_progress_bar", "enable_model_summary"), False
+    )
+    trainer: L.Trainer = build_part(cfg.trainer, {**quiet, "plugins": [environment()]})
+    return trainer
+
+
+@contextmanager
+def first_speaks(share: Share) -> Iterator[None]:
+    """Let all processes but the first say nothing but errors meanwhile."""
+    if share.process == 0:
+        yield
+        return
+    logging.disable(logging.WARNING)
+    try:
+        with warnings.catch_warnings(action="ignore"), reported_to(lambda moment: None):
+            yield
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 @dataclass(frozen=True)
@@ -171,13 +219,9 @@ def _work(
     root = logging.getLogger()
     root.setLevel(logging.INFO)
     root.addHandler(QueueHandler(records))
-    quiet = nullcontext() if share.process == 0 else reported_to(lambda moment: None)
-    if share.process > 0:  # the first one speaks for all
-        logging.disable(logging.WARNING)
-        warnings.simplefilter("ignore")
     failure: BaseException | None = None
     try:
-        with listening(in_worker=True), quiet:
+        with listening(in_worker=True), first_speaks(share):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
             work(share)
     except BaseException as error:

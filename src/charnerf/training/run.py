@@ -14,6 +14,7 @@ from omegaconf import DictConfig
 from charnerf.data.base import AbstractData
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.sampler import Share
+from charnerf.distributed import gathered
 from charnerf.files import named_full_disk, write_text
 from charnerf.inference.build import build_model, build_part, build_renderer
 from charnerf.inference.weights import save_config, save_weights
@@ -27,7 +28,7 @@ from charnerf.training.data import build_data
 from charnerf.training.finish import finish_run
 from charnerf.training.identity import RunIdentity, WrittenRun, data_of, written_run
 from charnerf.training.module import TrainingModule
-from charnerf.training.processes import processes_to_begin, run_processes
+from charnerf.training.processes import first_speaks, meet, processes_to_begin, run_processes
 from charnerf.training.start import begin
 from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
 from charnerf.training.trainer import build_trainer, log_hyperparameters
@@ -80,9 +81,15 @@ def run_training(
         begin_process: Sets each process that a training on several devices begins, as the caller's own is set; a function of a
             module.
     """
+    _hush_lightning()
+    count = processes_to_begin(cfg)
+    share = meet(cfg) if count == 1 else Share()
+    if share.processes > 1:
+        with first_speaks(share):
+            _train_in(lambda: None, _from_first(cfg, folder, accepted, share), share)
+        return
     prepared, network = _prepare(cfg, folder)
     accepted()
-    count = processes_to_begin(cfg)
     if count == 1:
         _train(prepared, network)
         return
@@ -93,8 +100,31 @@ def run_training(
 
 def _train_in(begin_process: Callable[[], object], prepared: _Prepared, share: Share) -> None:
     """Train as one process of several."""
+    _hush_lightning()
     begin_process()
     _train(prepared, _begin(prepared.cfg, prepared.checkpoint))
+
+
+def _from_first(cfg: DictConfig, folder: Path, accepted: Callable[[], object], share: Share) -> _Prepared:
+    """What the first of several processes prepares, its folder too; its error is that of all."""
+    outcome: _Prepared | Exception | None = None
+    if share.process == 0:
+        try:
+            outcome, _ = _prepare(cfg, folder)
+            accepted()
+        except Exception as error:
+            outcome = error
+    first = gathered(outcome)[0]
+    if isinstance(first, Exception):
+        raise first
+    assert first is not None
+    return first
+
+
+def _hush_lightning() -> None:
+    """The bar and the report say what Lightning would."""
+    for name in ("lightning.pytorch", "lightning.fabric"):
+        logging.getLogger(name).setLevel(logging.WARNING)
 
 
 def _prepare(cfg: DictConfig, folder: Path) -> tuple[_Prepared, _Network]:
@@ -115,8 +145,6 @@ def _prepare(cfg: DictConfig, folder: Path) -> tuple[_Prepared, _Network]:
 
 def _begin(cfg: DictConfig, checkpoint: Path | None) -> _Network:
     """Build the model; the same each time."""
-    for name in ("lightning.pytorch", "lightning.fabric"):  # the bar and the report say the rest
-        logging.getLogger(name).setLevel(logging.WARNING)
     L.seed_everything(cfg.seed, verbose=False)
     model = build_model(cfg)
     return _Network(model, begin(model, cfg) if checkpoint is None else None)

@@ -1,5 +1,6 @@
 """Lightning's trainer of a run, and the config as TensorBoard shows it."""
 
+import os
 from collections.abc import Sequence
 from datetime import timedelta
 from functools import partial
@@ -8,7 +9,12 @@ from pathlib import Path
 import lightning as L
 from lightning.pytorch.callbacks import Checkpoint, ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.plugins.environments import SLURMEnvironment
+from lightning.pytorch.plugins.environments import (
+    ClusterEnvironment,
+    LightningEnvironment,
+    SLURMEnvironment,
+    TorchElasticEnvironment,
+)
 from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard.summary import hparams
 
@@ -58,7 +64,7 @@ def build_trainer(
         cfg.trainer,
         {
             "callbacks": callbacks,
-            "plugins": [CheckpointFiles(), *_environment()],
+            "plugins": [CheckpointFiles(), environment()],
             "logger": TensorBoardLogger(str(folder), name="", version="tensorboard", default_hp_metric=False),
             "max_epochs": -1,
             "num_sanity_val_steps": 0,
@@ -88,9 +94,14 @@ def _checkpoints(cfg: DictConfig, folder: Path) -> list[Checkpoint]:
     return [best, last]
 
 
-def _environment() -> list[SLURMEnvironment]:
-    """Lightning's own answer to SLURM's signals, which writes other checkpoints, is left out: ours is that of every machine."""
-    return [SLURMEnvironment(auto_requeue=False)] if SLURMEnvironment.detect() else []
+def environment() -> ClusterEnvironment:
+    """Who begins the processes of a training: srun where it has begun several, torchrun, or the command itself.
+
+    Lightning's own answer to SLURM's signals, which writes other checkpoints, is left out: ours is that of every machine.
+    """
+    if SLURMEnvironment.detect() and os.environ["SLURM_NTASKS"] != "1":
+        return SLURMEnvironment(auto_requeue=False)
+    return TorchElasticEnvironment() if TorchElasticEnvironment.detect() else LightningEnvironment()
 
 
 def log_hyperparameters(trainer: L.Trainer, cfg: DictConfig, model: CharNeRF) -> None:
