@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 
+from benchmarks import processes, repeats
 from benchmarks.builds import build_rows, large_network
 from benchmarks.grids import grid_share
 from benchmarks.hull_cut import cut_by_hull
@@ -191,6 +192,10 @@ PARTS: dict[str, Part] = {
         step_at_scale(setting.pictured[0], "base", repeats=1),
     ],
     "threads": lambda setting: thread_rows(setting.say),
+    "processes": lambda setting: processes.process_rows(setting.say),
+    "repeats": lambda setting: [
+        repeats.repeat_row(setting.model.source, setting.pictured[0], rounds=repeats.ROUNDS)
+    ],
     "losses": _losses,
     "grids": lambda setting: [
         {"character": one.name, **vars(grid_share(one, cells=256, num_cameras=8))}

@@ -188,6 +188,21 @@ SECTIONS: dict[str, tuple[str, Show]] = {
             "of 30 s in turns. `always`: OMP_NUM_THREADS is set."
         ),
     ),
+    "processes": (
+        "Processes",
+        _table(
+            "Trainings at `scale=small` of as many steps by `python train.py`, medians over turns. The error is reached when"
+            " validation on the foreground reaches what the worst of them reaches; one process of twice the batch and two"
+            " processes make the same steps."
+        ),
+    ),
+    "repeats": (
+        "Memory of repeated work",
+        _table(
+            "`charnerf.load()`, encode, render at 96 pixels, again and again in one process; resident MiB, medians of 20 rounds;"
+            " `growth` from those after the tenth to the last."
+        ),
+    ),
     "losses": (
         "Loss curves",
         _table(

@@ -30,7 +30,7 @@ def process_peak_mib() -> float:
     return peak / _MIB if sys.platform == "darwin" else peak / 1024.0
 
 
-def _resident_mib() -> float | None:
+def resident_mib() -> float | None:
     """Resident memory of this process now, MiB; None where the system does not tell."""
     try:
         return int(_STATM.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / _MIB
@@ -102,7 +102,7 @@ class Stopwatch:
         if self.device.type == "cuda":
             held: float | None = torch.cuda.max_memory_allocated(self.device) / _MIB
         else:
-            held = _resident_mib()
+            held = resident_mib()
         if held is not None:
             self._peaks[name] = max(self._peaks.get(name, 0.0), held)
 
