@@ -14,6 +14,7 @@ from charnerf.drawings.enclosed import shared
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.options import ReadingOptions
+from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.picture import draw_assumptions
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.errors import DataError
@@ -111,7 +112,11 @@ def read_views(
             *inked,
             *_mended(agreement, names, options.reconciled),
         ),
-        warnings=(*_small_figures(figures, extent, size), *_disagreements(agreement, figures)),
+        warnings=(
+            *_small_figures(figures, extent, size),
+            *_disagreements(agreement, figures),
+            *_other_designs(given, figures),
+        ),
         picture=draw_assumptions(
             given, canvases, list(names), [figure.drawing.name for figure in figures], extent
         ),
@@ -242,6 +247,17 @@ def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list
         " picture."
         for figure in figures
         if figure.box.height * 2.0 * extent / HEIGHT < 0.5 * size
+    ]
+
+
+def _other_designs(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[str]:
+    """Drawings in other colours than the first one's."""
+    first, *others = [palette(canvas) for canvas in canvases]
+    return [
+        f"{figure.drawing.name}: shares only {100 * share:.0f} % of its colours with {figures[0].drawing.name}: are both of one"
+        " character and design? Give drawings of one, or leave this out."
+        for figure, share in zip(figures[1:], (shared_colors(first, one) for one in others), strict=True)
+        if share < FEW_SHARED
     ]
 
 
