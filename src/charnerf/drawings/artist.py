@@ -68,11 +68,11 @@ def draw_character(
         character: With its mesh; one without is drawn from its source views, at their size and in its pose.
         size: Side of the drawings, pixels.
         seed: Of the style and of the hand; another character has another style at the same seed.
-        level: Of disagreement, index into LEVELS; at 0 views are captured and neither inked nor moved.
+        level: Of disagreement, index into LEVELS; at 0 views are captured, with their alpha, and neither inked nor moved.
         azimuths_deg: From where it is drawn, by the names that the views get; the first rules.
 
     Returns:
-        RGB uint8 (size, size, 3) on paper, by the name of the view.
+        RGB uint8 (size, size, 3) on paper, RGBA at level 0, by the name of the view.
 
     Raises:
         ConfigError: If there is no such level.
@@ -128,15 +128,16 @@ def captured(
 
 
 def on_paper(images: Tensor, mistakes: Mistakes, *, seed: int) -> np.ndarray:
-    """Views (V, 4, S, S) drawn in one style, each with mistakes of its own; as they are where there are none.
+    """Views (V, 4, S, S) drawn in one style, each with mistakes of its own; as they are, without paper, where there are none.
 
     Returns:
-        RGB uint8 (V, S, S, 3).
+        RGB uint8 (V, S, S, 3), or RGBA.
     """
-    if mistakes.wobble or mistakes.shift or mistakes.scale:
-        generator = torch.Generator().manual_seed(seed)
-        style = random_style(generator, wobble=mistakes.wobble, shift=mistakes.shift, scale=mistakes.scale)
-        images = draw_pictures(images, style, generator)
+    if not (mistakes.wobble or mistakes.shift or mistakes.scale):
+        return to_bytes(images.permute(0, 2, 3, 1))
+    generator = torch.Generator().manual_seed(seed)
+    style = random_style(generator, wobble=mistakes.wobble, shift=mistakes.shift, scale=mistakes.scale)
+    images = draw_pictures(images, style, generator)
     paper = torch.tensor(PAPER)[:, None, None] / 255.0
     rgb = images[:, :3] * images[:, 3:] + paper * (1.0 - images[:, 3:])
     return to_bytes(rgb.permute(0, 2, 3, 1))

@@ -112,11 +112,7 @@ def read_views(
             *inked,
             *_mended(agreement, names, options.reconciled),
         ),
-        warnings=(
-            *_small_figures(figures, extent, size),
-            *_disagreements(agreement, figures),
-            *_other_designs(given, figures),
-        ),
+        warnings=_doubts(figures, given, extent, agreement),
         picture=draw_assumptions(
             given, canvases, list(names), [figure.drawing.name for figure in figures], extent
         ),
@@ -239,6 +235,14 @@ def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[s
                 f" looks the other way, say --side {other}, or of a sheet --figure {other}=N."
             )
     return lines
+
+
+def _doubts(
+    figures: Sequence[_Figure], canvases: Sequence[np.ndarray], extent: float, agreement: Reconciliation
+) -> tuple[str, ...]:
+    """What looks wrong."""
+    small = _small_figures(figures, extent, canvases[0].shape[0])
+    return (*small, *_disagreements(agreement, figures), *_other_designs(canvases, figures))
 
 
 def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
