@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from charnerf.errors import (
         ShapeError as ShapeError,
     )
+    from charnerf.inference.baked_file import load_baked as load_baked
+    from charnerf.inference.baked_file import save_baked as save_baked
     from charnerf.inference.hero import Hero as Hero
     from charnerf.inference.model import Model as Model
     from charnerf.inference.weights import load as load
@@ -46,6 +48,8 @@ except PackageNotFoundError:  # a checkout on the path, not installed
 _HOMES = {
     "load": "charnerf.inference.weights",
     "save_weights": "charnerf.inference.weights",
+    "load_baked": "charnerf.inference.baked_file",
+    "save_baked": "charnerf.inference.baked_file",
     "save_mesh": "charnerf.meshing.export",
     "Model": "charnerf.inference.model",
     "Hero": "charnerf.inference.hero",

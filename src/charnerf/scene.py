@@ -75,7 +75,7 @@ class AbstractField(ABC):
         return low, float((high - low).amax()) / LATTICE_CELLS
 
     def uncut_densities(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Densities (P,), 1/m, without a direction, before the drawings cut them, and the share of them (P,) that these leave."""
+        """Densities (P,), 1/m, without a direction, before drawings cut them, and the share (P,) that these leave, above 1 all."""
         densities = self.densities(points, torch.zeros_like(points)).densities
         return densities, torch.ones_like(densities)
 

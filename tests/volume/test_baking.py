@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from charnerf.geometry.cameras import pixel_lattice, project_into_all
+from charnerf.volume.baking.bake import _without_bias
 from charnerf.volume.baking.directions import polynomials, projection, sampled_directions
 from charnerf.volume.baking.grid import EMPTY_U, combined, densities_from_u, interpolated, u_from_densities
 from charnerf.volume.baking.lattice import corners_of, finer_points, gaps, light_depths
@@ -105,3 +106,22 @@ def test_a_lattice_goes_through_the_centres_of_pixels():
     torch.testing.assert_close(pixels - 0.5, (pixels - 0.5).round(), atol=1e-3, rtol=0)
     assert pitch == pytest.approx(1.0 / float(cameras.focal[0, 0]))
     assert math.isfinite(float(through.sum()))
+
+
+def test_curved_values_are_right_in_the_mean_between_points():
+    """Along each axis, of a parabola: bent at the lattice's points nothing moves; beside nothing neither."""
+    shape = (5, 5, 5)
+    places = torch.ones(shape).nonzero()
+    index = torch.arange(125, dtype=torch.int32).view(shape) + 2
+    for axis in range(3):
+        along = places[:, axis].double()
+        moved = _without_bias(-(along**2), index, places, 2)
+        fine = torch.linspace(0.0, 4.0, 4001, dtype=torch.float64)
+        at = torch.full((4001, 3), 1.0, dtype=torch.float64)
+        at[:, axis] = fine
+        error = interpolated(index - 2, moved[:, None], at)[:, 0] + fine**2
+        assert abs(float(error.mean())) < 1e-3
+        bent = -(along - 2.0).abs()
+        torch.testing.assert_close(_without_bias(bent, index, places, 2), bent)
+        jump = torch.where(along > 2, 1.0, EMPTY_U).double()
+        torch.testing.assert_close(_without_bias(jump, index, places, 2), jump)

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -22,6 +23,7 @@ from charnerf.cli.options import (
 )
 from charnerf.cli.summary import JsonFile, Summary, check_json, close
 from charnerf.drawings.options import ReadingOptions
+from charnerf.errors import ConfigError
 from charnerf.meshing.options import MeshOptions
 from charnerf.reconstruction.options import LIGHT, ReconstructionOptions
 from charnerf.wording import counted
@@ -34,6 +36,15 @@ EXAMPLES = (
     "charnerf reconstruct sheet.png -o hero --order front,side,back",
     "charnerf reconstruct front.png side.png --view 45=quarter.png -o hero --refine 30 --symmetric",
 )
+
+BakedFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        dir_okay=False,
+        help="Write the baked character there (.safetensors); charnerf.load_baked looks at it without the network.",
+    ),
+]
 
 
 @gathered(given=drawings_options, reading=reading_options, mesh=mesh_options(LIGHT))
@@ -59,6 +70,7 @@ def command(
             help="Adapt the multi-view blocks to the drawings first, for so long at most; kept only if better.",
         ),
     ] = ReconstructionOptions.refine_seconds,
+    bake: BakedFile = ReconstructionOptions.bake,
     device: Device = "auto",
     trust: Trusted = None,
     json_file: JsonFile = None,
@@ -71,14 +83,30 @@ def command(
     """
     began = time.perf_counter()
     check_json(json_file)
+    check_baked(bake, symmetric=symmetric)
     options = ReconstructionOptions(
-        replace(mesh, faces=faces, texture=texture), frames, size, symmetric, refine
+        replace(mesh, faces=faces, texture=texture), frames, size, symmetric, refine, bake
     )
     from charnerf.reconstruction.folder import reconstruct
 
     model = load_model(weights, device=device, trust=trust)
     done = reconstruct(model, output, options, given.drawings, reading=reading, sheet=given.sheet, say=say)
     close(_summary(done, frames, began), json_file)
+
+
+def check_baked(file: Path | None, *, symmetric: bool) -> None:
+    """Check, before the work, that a baked character can be written."""
+    from charnerf.files import check_folder
+
+    if file is None:
+        return
+    if symmetric:
+        raise ConfigError(
+            "--bake: found it with --symmetric, whose colours both sides' networks decide; leave one of them out."
+        )
+    if file.suffix != ".safetensors":
+        raise ConfigError(f"--bake: found {file}, expected a name that ends in .safetensors.")
+    check_folder(file.parent)
 
 
 def _summary(done: "Reconstruction", frames: int, began: float) -> Summary:

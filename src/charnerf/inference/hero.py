@@ -39,6 +39,7 @@ class Hero:
         renderer: How it is rendered.
         turnaround: What was assumed about the drawings; None where the views came with cameras.
         detailed: The same views with more pixels, None where there are none; for textures and large pictures.
+        framed: Radius that pictures frame, m, where a file says it; else by hull and drawings.
     """
 
     scene: Scene
@@ -46,6 +47,7 @@ class Hero:
     renderer: AbstractRenderer
     turnaround: Turnaround | None = None
     detailed: SourceViews | None = None
+    framed: float | None = None
     _scene_by_width: dict[int, Scene] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def render(self, *, azimuth_deg: float, elevation_deg: float = 0.0, size: int = 256) -> np.ndarray:
@@ -165,6 +167,8 @@ class Hero:
 
     @cached_property
     def _radius(self) -> float:
+        if self.framed is not None:
+            return self.framed
         bounds = self.scene.bounds
         hull, box_min = bounds.hull, bounds.box_min
         if hull is None:

@@ -80,7 +80,7 @@ class CharacterField(AbstractField):
         return pixel_lattice(self.maps.cameras) or super().lattice(low, high)
 
     def uncut_densities(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Densities (P,) before the drawings' coverage cuts them, and the share of them that it leaves."""
+        """Densities (P,) before the drawings' coverage cuts them, and the share of them that it leaves, above 1 all."""
         inputs = self.read(points)
         trunk = self.field.trunk(inputs, torch.zeros_like(points))
         return self.field.densities(trunk, torch.ones_like(inputs.kept)), inputs.kept

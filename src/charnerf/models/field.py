@@ -79,8 +79,8 @@ class Field(nn.Module):
         return TrunkOutput(raw_densities=raw, features=features, view_features=view_features)
 
     def densities(self, trunk: TrunkOutput, kept: Tensor) -> Tensor:
-        """Densities (P,), 1/m, of which the drawings leave a share `kept` (P,)."""
-        densities: Tensor = self.activation(trunk.raw_densities) * kept
+        """Densities (P,), 1/m, of which the drawings leave a share `kept` (P,), all where it is above 1."""
+        densities: Tensor = self.activation(trunk.raw_densities) * kept.clamp_max(1.0)
         return densities
 
     def colors(self, trunk: TrunkOutput, views: PointViews, view_dirs: Tensor) -> Tensor:

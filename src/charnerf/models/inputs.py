@@ -50,8 +50,8 @@ class FieldInputs:
         section_lengths: (P, 3), half of the lengths of those runs, in half-extents of the box; 0 if not read.
         box_points: (P, 3), the points in coordinates of the box, (-1, 1).
         rotations: (V, 3, 3), axes of the source cameras in the world: camera-to-world.
-        kept: (P,) in [0, 1], factor on the density: 0 where a drawing shows that nothing is there; 1 without a hull and in
-            training.
+        kept: (P,), factor on the density: 0 where a drawing shows that nothing is there, all from 1 on, where it runs on so that it
+            is straight across outlines; 1 without a hull and in training.
     """
 
     views: PointViews

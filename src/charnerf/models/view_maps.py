@@ -144,7 +144,7 @@ class ViewMaps:
         return (self.shown[view, top, left] | ~in_front).all(-1)
 
     def _kept(self, points: Tensor, shown: Tensor, in_front: Tensor) -> Tensor:
-        """How much of the densities (P,) the drawings' coverage leaves; it has no say behind a camera."""
+        """How much of the densities (P,) the drawings' coverage leaves, above 1 all; it has no say behind a camera."""
         if self.shown is None:
             return torch.ones_like(points[:, 0])
         coverage = torch.where(in_front, shown[..., 3], 1.0)
@@ -202,6 +202,12 @@ class Pictures(MovableRecord):
             pictures = resized_pictures(pictures, width, round(width * tall / wide))
         return cls(maps_to_rows(pictures), (pictures.shape[-1], pictures.shape[-2]))
 
+    @property
+    def images(self) -> Tensor:
+        """The drawings, (V, 3, H, W)."""
+        width, height = self.size
+        return self.rows.reshape(-1, height, width, 3).permute(0, 3, 1, 2)
+
     def read(self, uv: Tensor) -> Tensor:
         """Colours (P, V, 3) at places (P, V, 2), by the sides."""
         width, height = self.size
@@ -223,12 +229,12 @@ def _with_hull_maps(
 
 
 def kept_share(coverage: Tensor) -> Tensor:
-    """How much of the densities of points (P,) the drawings that carve leave, by their coverage (P, V) there.
+    """How much of the densities of points (P,) the drawings that carve leave, by their coverage (P, V) there; above 1 it is all.
 
     All of it inside of every outline, where pixels are covered by half or more; nothing where a drawing shows nothing at all.
     The hull, widened so that no surface is cut away, leaves room for figures to grow fat: a smooth field does.
     """
-    return (2.0 * coverage.amin(-1)).clamp_max(1.0)
+    return 2.0 * coverage.amin(-1)
 
 
 def widened_coverage(alphas: Tensor, dilations: Tensor | None) -> Tensor:

@@ -18,6 +18,7 @@ from charnerf.files import check_folder, write_folder_aside
 from charnerf.finetuning.command import refine
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import plot_curve, summary_lines
+from charnerf.inference.baked_file import save_baked
 from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
 from charnerf.meshing.build import BuiltMesh
@@ -179,6 +180,8 @@ def _pictures_and_mesh(
     progress.stage("bake")
     with _timed(seconds, "bake"):
         baked = hero.baked()
+        if options.bake is not None:
+            save_baked(options.bake, baked)
     progress.stage("pictures")
     with _timed(seconds, f"{options.frames} frames of {options.size} pixels"):
         on_frame = progress.counter(options.frames)

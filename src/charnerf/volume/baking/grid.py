@@ -31,6 +31,11 @@ def densities_from_u(u: Tensor) -> Tensor:
     return SCALE * F.softplus(u)
 
 
+def cut_densities(u: Tensor, kept: Tensor) -> Tensor:
+    """Densities (...), 1/m, of u (...) and of the shares of them that are left (...), above 1 all."""
+    return densities_from_u(u) * kept.clamp_max(1.0)
+
+
 @final
 @dataclass(frozen=True)
 class BakedGrid(MovableRecord):
@@ -43,7 +48,7 @@ class BakedGrid(MovableRecord):
         pitch: Of the lattice, m.
         factor: Steps of the fine grid in one of the lattice.
         index: Rows of the fine grid's points, (X, Y, Z) int32.
-        rows: u, the drawings' share of the density, and the density's error, 1/m, of points, (N, 3).
+        rows: u, the share of the density that is left (above 1 all), and the density's error, 1/m, of points, (N, 3).
         color_index: Rows of the lattice's points, ((X - 1) / factor + 1, ...) int32.
         color_rows: Coefficients of what colours are made of, and the colours' error, (M, B * C + 1); (1, 1) without colours.
         gaps: Cells, at most 255, from each of the lattice ((X - 1) / factor, ...) to the next one that holds something, along the
@@ -85,7 +90,7 @@ class BakedGrid(MovableRecord):
     def read_densities(self, at: Tensor) -> tuple[Tensor, Tensor]:
         """Densities (P,) and their errors (P,), 1/m, at places (P, 3) counted in steps of the fine grid."""
         u, kept, error = interpolated(self.index, self.rows, at).unbind(-1)
-        return densities_from_u(u) * kept, error
+        return cut_densities(u, kept), error
 
     def read_colors(self, at: Tensor, polynomials: Tensor) -> tuple[Tensor, Tensor]:
         """What colours are made of (P, C) by polynomials (P, B), and their errors (P,), at places (P, 3) in the lattice's cells."""

@@ -1,0 +1,99 @@
+"""Baked characters as files: the same pictures without the network; what is broken is named."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+
+from charnerf.errors import DataError
+from charnerf.inference.baked_file import load_baked, save_baked
+from charnerf.inference.hero import Hero
+from charnerf.volume.quadrature import PiecewiseConstant
+from charnerf.volume.renderers.culled import CulledRenderer
+from support import helpers, tiny_models
+
+LOOK = {"azimuth_deg": 30.0, "elevation_deg": 10.0, "size": 24}
+
+
+@pytest.fixture(scope="module")
+def hero() -> Hero:
+    model = (
+        tiny_models.shake(tiny_models.tiny_model(views="mirrored"), scale=0.1).requires_grad_(False).eval()
+    )
+    views = helpers.source_views(helpers.person())
+    renderer = CulledRenderer(
+        quadrature=PiecewiseConstant(), num_coarse=16, num_fine=0, hull_steps=128, memory_mib=256
+    )
+    scene = model.scene(model.encode(views), 0)
+    return Hero(scene=scene, views=views, renderer=renderer).baked()
+
+
+@pytest.fixture(scope="module")
+def file(hero, tmp_path_factory):
+    return save_baked(tmp_path_factory.mktemp("baked") / "größe.safetensors", hero)
+
+
+def test_a_file_gives_the_same_pictures_without_the_network(hero, file):
+    loaded = load_baked(file)
+    assert loaded.scene.field.source is None and loaded.radius() == hero.radius()
+    alone = replace(hero, scene=replace(hero.scene, coarse=replace(hero.scene.field, source=None)))
+    seen = loaded.render(**LOOK)
+    assert seen[..., 3].max() > 0.1
+    np.testing.assert_allclose(seen, alone.render(**LOOK), atol=1e-6)
+    assert np.abs(seen[..., 3] - hero.render(**LOOK)[..., 3]).max() < 1e-6
+
+
+def test_a_character_that_is_not_baked_is_refused(hero, tmp_path):
+    plain = replace(hero, scene=replace(hero.scene, coarse=hero.scene.field.source))
+    with pytest.raises(DataError, match="not baked"):
+        save_baked(tmp_path / "x.safetensors", plain)
+    with pytest.raises(DataError, match="not made symmetric"):
+        save_baked(tmp_path / "x.safetensors", plain.symmetric().baked())
+    assert not list(tmp_path.iterdir())
+
+
+def _contents(file):
+    with safe_open(str(file), framework="pt") as opened:
+        return {name: opened.get_tensor(name) for name in opened.keys()}, opened.metadata()
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("grid.index", lambda one: one + 10**6, "grid.index: found rows"),
+        ("grid.color_index", lambda one: one - 5, "grid.color_index: found rows"),
+        ("grid.rows", lambda one: one * float("nan"), "grid.rows: found values that are not finite"),
+        ("grid.rows", lambda one: one[:, :2].contiguous(), "grid.rows: found"),
+        ("grid.gaps", lambda one: one[:-1].contiguous(), "grid.index: found"),
+        ("grid.color_rows", lambda one: one[:, 1:].contiguous(), "grid.color_rows: found"),
+        ("drawn.encoded", None, "lacks a part of a baked character"),
+        ("drawn.focal", lambda one: one[:1].contiguous(), "lacks a part of a baked character"),
+    ],
+)
+def test_broken_files_are_named(file, tmp_path, name, change, words):
+    tensors, metadata = _contents(file)
+    tensors = {**tensors, name: None if change is None else change(tensors[name])}
+    broken = tmp_path / "broken.safetensors"
+    save_file({key: one for key, one in tensors.items() if one is not None}, broken, metadata=metadata)
+    with pytest.raises(DataError, match=words):
+        load_baked(broken)
+
+
+def test_other_files_are_refused(file, tmp_path):
+    tensors, metadata = _contents(file)
+    other = tmp_path / "other.safetensors"
+    save_file(tensors, other, metadata={"format": "else"})
+    with pytest.raises(DataError, match="charnerf reconstruct --bake"):
+        load_baked(other)
+    facts = {**json.loads(metadata["baked"]), "factor": 10**9}
+    save_file(tensors, other, metadata={**metadata, "baked": json.dumps(facts)})
+    with pytest.raises(DataError, match="expected pitch, factor"):
+        load_baked(other)
+    other.write_bytes(b"no tensors")
+    with pytest.raises(DataError, match="safetensors"):
+        load_baked(other)
+    assert torch.is_tensor(tensors["grid.rows"])
