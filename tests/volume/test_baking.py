@@ -115,11 +115,11 @@ def test_curved_values_are_right_in_the_mean_between_points():
     index = torch.arange(125, dtype=torch.int32).view(shape) + 2
     for axis in range(3):
         along = places[:, axis].double()
-        moved = _without_bias(-(along**2), index, places, 2)
+        moved = _without_bias(-0.5 * along**2, index, places, 2)
         fine = torch.linspace(0.0, 4.0, 4001, dtype=torch.float64)
         at = torch.full((4001, 3), 1.0, dtype=torch.float64)
         at[:, axis] = fine
-        error = interpolated(index - 2, moved[:, None], at)[:, 0] + fine**2
+        error = interpolated(index - 2, moved[:, None], at)[:, 0] + 0.5 * fine**2
         assert abs(float(error.mean())) < 1e-3
         bent = -(along - 2.0).abs()
         torch.testing.assert_close(_without_bias(bent, index, places, 2), bent)
