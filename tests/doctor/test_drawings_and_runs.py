@@ -96,3 +96,17 @@ def test_faults_of_runs(finished: Path, tmp_path: Path) -> None:
     (broken / "metrics.json").write_text(json.dumps({"psnr": 1.0}))
     told = faults(list(run_findings(broken)))
     assert told.count("numbers that are not finite") == 2 and told.count("truncated file") == 3
+
+
+def test_many_alike_are_told_once_and_masks_may_be_of_one_bit(tmp_path: Path) -> None:
+    cameras, images = sets.around(), sets.pictures(sets.around())
+    sets.write_nerfstudio(tmp_path / "set", cameras, images)
+    for file in (tmp_path / "set/masks").iterdir():
+        with Image.open(file) as mask:
+            mask.convert("1").save(file)
+    find = lambda: list(dataset_findings(tmp_path / "set", processes=1, examined=lambda _: None))  # noqa: E731
+    assert find() == []
+    for file in (tmp_path / "set/masks").iterdir():
+        file.write_bytes(b"")
+    told = [one for one in find() if one.fault == "broken mask"]
+    assert len(told) == 3 and "5 more views" in told[-1].found

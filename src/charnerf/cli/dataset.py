@@ -56,17 +56,20 @@ class GivenDataset:
             ConfigError: If something is said of views that a data set of ours says itself.
             DataError: If it can not be read.
         """
+        from charnerf.data.shards import CACHE_MIB, INDEX_FILE, open_cache
+        from charnerf.files import user_cache
         from charnerf.foreign.kept import is_ours, kept_copy
         from charnerf.foreign.reading import Reading
 
-        if not is_ours(self.folder):
+        is_packed = (self.folder / INDEX_FILE).is_file()
+        if not is_ours(self.folder) and not is_packed:
             return kept_copy(self.folder, self.reading or Reading(size=SIZE))
         if self.reading is not None:
             raise ConfigError(
                 f"--front, --side, --back, --keep-frame, --pixels: {self.folder} is a data set of charnerf, which says its own"
                 " views, expected them with foreign ones alone. Leave them out."
             )
-        return self.folder
+        return open_cache(str(self.folder), user_cache(), CACHE_MIB) if is_packed else self.folder
 
 
 def dataset_options(

@@ -29,6 +29,7 @@ INDEX_FILE, CACHE_FILE = "index.json", "cache.json"
 MOST_INDEX = 256 * 2**20  # bytes
 MOST_SHARD = 4 * 2**30
 MOST_FILES = 100_000  # of a character
+CACHE_MIB = 20480.0  # of commands' caches
 _LOCK, _USED = ".cache.lock", ".used-"
 _TAR_MAGIC = slice(257, 262)
 

@@ -1,10 +1,12 @@
 """A data set's characters examined, one by one: files, figures, cameras, mesh."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import DEPTH_FOLDER
@@ -20,8 +22,13 @@ from charnerf.doctor.views import Patient, View
 from charnerf.errors import DataError
 from charnerf.foreign.base import AbstractFormat, Found
 from charnerf.foreign.kept import is_ours, recognised
+from charnerf.foreign.shot import read_mask
 from charnerf.foreign.transforms_json import TransformsJson, camera_files
+from charnerf.geometry.carving import spread
 
+MOST_ALIKE = 3  # findings of one kind that are told of a character
+PICTURE_SIDE = 256  # pixels of evidence
+MOST_SEEN = 400  # views of a character whose cameras are compared
 MOST_BYTES_HELD = 2**30  # of a character's pictures at once; further ones are not examined
 
 
@@ -76,12 +83,13 @@ def _examine(admit: Callable[[], Patient]) -> list[Finding]:
     twice = list(duplicates(views, pictures))
     again = {one.where for one in twice}
     kept = [place for place, view in enumerate(views) if str(view.file) not in again]
+    kept = spread(torch.tensor(kept, dtype=torch.long), MOST_SEEN).tolist()
     findings += twice
     if not kept:
-        return [*findings, *mesh_findings(patient, None)]
+        return _told([*findings, *mesh_findings(patient, None)])
     views, pictures, alphas = ([every[place] for place in kept] for every in (views, pictures, alphas))  # type: ignore[assignment]
     wrong, agreeing = geometry_findings(patient, seen(views, pictures, alphas))
-    return [*findings, *wrong, *mesh_findings(patient, agreeing)]
+    return _told([*findings, *wrong, *mesh_findings(patient, agreeing)])
 
 
 def _examined_view(view: View) -> tuple[np.ndarray | None, np.ndarray | None, list[Finding]]:
@@ -89,7 +97,7 @@ def _examined_view(view: View) -> tuple[np.ndarray | None, np.ndarray | None, li
     picture, findings = picture_findings(view.file, view.size)
     if picture is None:
         return None, None, findings
-    mask, wrong = _mask(view, picture.shape[:2])
+    mask, wrong = _mask(view, (picture.shape[1], picture.shape[0]))
     findings += wrong
     alpha = figure_alpha(picture, mask)
     wrong = list(figure_findings(view, picture, alpha))
@@ -97,17 +105,39 @@ def _examined_view(view: View) -> tuple[np.ndarray | None, np.ndarray | None, li
     return picture, alpha if fits and not wrong else None, findings + wrong
 
 
-def _mask(view: View, shape: tuple[int, int]) -> tuple[np.ndarray | None, list[Finding]]:
+def _mask(view: View, size: tuple[int, int]) -> tuple[np.ndarray | None, list[Finding]]:
     """A view's mask (H, W) in [0, 1], None where there is none that fits."""
     if view.mask is None:
         return None, []
-    picture, findings = picture_findings(view.mask, (shape[1], shape[0]))
-    findings = [
-        one for one in findings if one.fault in ("truncated file", "unequal sizes")
-    ]  # masks may be grey of any depth
-    if picture is None or picture.shape[:2] != shape:
-        return None, findings
-    return picture[..., :3].mean(axis=-1) / 255.0, findings
+    try:
+        return read_mask(view.mask, size).numpy(), []
+    except DataError as error:
+        fix = "Restore it, or make it as large as its picture."
+        return None, [Finding("broken mask", str(view.mask), str(error), "a mask of its picture's size", fix)]
+
+
+def _told(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings of a character, few of each kind, with small pictures: hundreds of views may have one and the same fault."""
+    told = []
+    for fault in dict.fromkeys(one.fault for one in findings):
+        alike = [one for one in findings if one.fault == fault]
+        more = len(alike) - MOST_ALIKE
+        last = alike[:MOST_ALIKE][-1]
+        shown = alike[:MOST_ALIKE]
+        if more > 0:
+            shown[-1] = replace(
+                last, found=f"{last.found}; and {more} more views of this character have this fault"
+            )
+        told += [replace(one, picture=_small(one.picture)) for one in shown]
+    return told
+
+
+def _small(picture: np.ndarray | None) -> np.ndarray | None:
+    """A picture of at most about PICTURE_SIDE pixels a side."""
+    if picture is None:
+        return None
+    step = -(-max(picture.shape[:2]) // PICTURE_SIDE)
+    return np.ascontiguousarray(picture[::step, ::step])
 
 
 def _of_ours(root: Path, name: str) -> Patient:

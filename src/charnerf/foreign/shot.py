@@ -100,20 +100,16 @@ def picture_size(file: Path) -> tuple[int, int]:
         raise DataError(f"{file}: can not be read as a picture ({error}); restore it.") from error
 
 
-def _read(shot: Shot) -> Tensor:
-    """Colours times alpha, and alpha, (H, W, 4) in [0, 1]."""
-    rgba = read_rgba(shot.file, shot.size).float() / 255.0
-    if shot.mask is not None:
-        alpha = rgba[..., 3] * _mask(shot.mask, shot.size)
-    elif bool((rgba[..., 3] < 1.0).any()):
-        alpha = rgba[..., 3]
-    else:
-        alpha = _beside_white(rgba[..., :3], shot)
-    return torch.cat((rgba[..., :3] * alpha[..., None], alpha[..., None]), dim=-1)
+def read_mask(file: Path, size: tuple[int, int]) -> Tensor:
+    """A mask (H, W) in [0, 1], white where the figure is.
 
+    Args:
+        file: A picture of any depth.
+        size: Width and height that it has to have, pixels.
 
-def _mask(file: Path, size: tuple[int, int]) -> Tensor:
-    """A mask (H, W) in [0, 1]."""
+    Raises:
+        DataError: If it is missing, no picture, or of another size.
+    """
     found = picture_size(file)
     if found != size:
         raise DataError(
@@ -125,6 +121,18 @@ def _mask(file: Path, size: tuple[int, int]) -> Tensor:
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(f"{file}: can not be read as a picture ({error}); restore it.") from error
     return torch.from_numpy(grey / OPAQUE_ALPHA)
+
+
+def _read(shot: Shot) -> Tensor:
+    """Colours times alpha, and alpha, (H, W, 4) in [0, 1]."""
+    rgba = read_rgba(shot.file, shot.size).float() / 255.0
+    if shot.mask is not None:
+        alpha = rgba[..., 3] * read_mask(shot.mask, shot.size)
+    elif bool((rgba[..., 3] < 1.0).any()):
+        alpha = rgba[..., 3]
+    else:
+        alpha = _beside_white(rgba[..., :3], shot)
+    return torch.cat((rgba[..., :3] * alpha[..., None], alpha[..., None]), dim=-1)
 
 
 def _beside_white(rgb: Tensor, shot: Shot) -> Tensor:
