@@ -43,9 +43,13 @@ class Moment:
         """Title and stage."""
         return self.title if self.stage == self.title else f"{self.title}: {self.stage}"
 
+    @property
+    def left(self) -> str:
+        """How long it takes still, in words after a comma; nothing where that is not known, or all is done."""
+        return "" if self.left_s is None or self.share >= 1.0 else f", about {left_text(self.left_s)} left"
+
     def __str__(self) -> str:
-        left = "" if self.left_s is None else f", about {left_text(self.left_s)} left"
-        return f"{self.what}, {100 * self.share:.0f} %{left}{f' ({self.note})' if self.note else ''}"
+        return f"{self.what}, {100 * self.share:.0f} %{self.left}{f' ({self.note})' if self.note else ''}"
 
 
 Listener = Callable[[Moment], object]
@@ -247,9 +251,8 @@ class _Bar:
 
     def _draw(self, moment: Moment) -> None:
         self.last = None
-        left = "" if moment.left_s is None else f", about {left_text(moment.left_s)} left"
         note = f"  {moment.note}" if moment.note else ""
-        self.bar.update(self.task, completed=moment.share, description=moment.what, after=left + note)
+        self.bar.update(self.task, completed=moment.share, description=moment.what, after=moment.left + note)
         self.bar.refresh()
 
     def say(self, text: str) -> None:

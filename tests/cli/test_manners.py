@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from pathlib import Path
 
 import pytest
 import typer
@@ -10,7 +11,7 @@ from charnerf.cli import app as commands
 from charnerf.cli import run
 from charnerf.cli.app import app
 from charnerf.cli.messages import quiet, say
-from charnerf.cli.summary import Summary, close
+from charnerf.cli.summary import Summary, close, typed
 from charnerf.errors import DependencyError
 from charnerf.meshing import export
 
@@ -154,6 +155,13 @@ def test_tab_completes(words, offered, dataset, monkeypatch, capsys):
     monkeypatch.setenv("COMP_CWORD", str(len(shlex.split(words)) - (not words.endswith(" "))))
     assert run([]) == 0
     assert capsys.readouterr().out.split() == [one.replace("NAME", name) for one in offered]
+
+
+def test_a_command_that_is_proposed_can_be_typed():
+    assert (
+        typed("reconstruct", Path("-a b.png"), "-o", Path("hero"))
+        == "charnerf reconstruct './-a b.png' -o hero"
+    )
 
 
 def test_env_tells_versions_and_machine(tmp_path, capsys):

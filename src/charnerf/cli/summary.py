@@ -97,5 +97,11 @@ def check_json(json_file: Path | None) -> None:
 
 
 def typed(*words: str | Path) -> str:
-    """A command as it is typed; words that shells would take apart are quoted."""
-    return shlex.join(["charnerf", *map(str, words)])
+    """A command as it is typed: words that shells would take apart are quoted, paths that begin with a dash are no options."""
+    dashed = [isinstance(word, Path) and str(word).startswith("-") for word in words]
+    return shlex.join(
+        [
+            "charnerf",
+            *(f"./{word}" if is_dashed else str(word) for word, is_dashed in zip(words, dashed, strict=True)),
+        ]
+    )
