@@ -8,9 +8,9 @@ from charnerf.progress import Progress
 from charnerf.reconstruction.options import ReconstructionOptions
 
 # seconds on two cores
-ENCODE, BAKE, WRITE = 1.0, 5.0, 3.0
-FRAME = 0.15  # of 192 pixels
-SURFACE = 10.0  # of a grid of 128
+ENCODE, BAKE, WRITE = 1.0, 18.0, 3.0
+FRAME = 0.4  # of 192 pixels
+SURFACE = 4.0  # of a grid of 128
 TEXTURE = 1.0 / 4000.0  # a face
 ALL_FACES = 30_000  # of a grid of 128
 MESH_POINTS = 0.1  # of the grid, evaluated in the usual case
