@@ -11,6 +11,7 @@ from torch.utils.flop_counter import FlopCounterMode
 from benchmarks.grids import grid_share, hausdorff
 from benchmarks.hull_cut import cut_by_hull
 from benchmarks.kinds import KINDS
+from benchmarks.processes import Course
 from benchmarks.roofline import IN_PLACE, roofline
 from benchmarks.scaling import exponent, grow
 from benchmarks.tricks import tricks
@@ -44,6 +45,12 @@ def test_a_sparse_grid_gives_the_mesh_of_all_points():
     found = grid_share(tiny_subject(), cells=64, num_cameras=8)
     assert found.same and found.distance < 1e-4
     assert 0.0 < found.share <= found.all_share < 0.2
+
+
+def test_seconds_to_an_error_are_those_of_the_first_that_reaches_it():
+    course = Course(seconds=(1.0, 2.0, 3.0, 4.0), decibels=(9.0, 12.0, 11.0, 13.0), steps=8)
+    assert course.seconds_to(11.0) == 2.0 and course.seconds_to(12.5) == 4.0
+    assert course.seconds_to(14.0) == math.inf
 
 
 def test_distance_of_meshes():

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from benchmarks import __main__ as command
-from benchmarks import threads
+from benchmarks import processes, repeats, threads
 from benchmarks.losses import compared_curves, loss_curves
 from benchmarks.parts import PARTS
 from benchmarks.plots import plot_kinds, plot_losses
@@ -198,6 +198,9 @@ def test_sections_show_their_numbers():
 def test_parts_run_on_the_released_weights(name, tmp_path, monkeypatch):
     monkeypatch.setattr(threads, "SECONDS", 3)
     monkeypatch.setattr(threads, "ROUNDS", 1)
+    monkeypatch.setattr(processes, "STEPS", 4)
+    monkeypatch.setattr(processes, "MARKS", 2)
+    monkeypatch.setattr(repeats, "ROUNDS", 40)
     command.main(["--part", name, "-o", str(tmp_path), "--device", "cpu"])
     (part,) = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))["parts"]
     assert part["part"] == name and part["result"]
