@@ -8,16 +8,18 @@ import logging
 import multiprocessing
 import os
 import signal
+import threading
 import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from logging.handlers import QueueHandler, QueueListener
+from logging.handlers import QueueHandler
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from multiprocessing.queues import Queue
+from pickle import UnpicklingError
+from queue import SimpleQueue
 
 import lightning as L
 from lightning.fabric.plugins.environments.lightning import find_free_network_port
@@ -111,19 +113,35 @@ class _Report:
     error: BaseException
 
 
-@dataclass(frozen=True)
 class _Member:
-    """One of the processes, and where its report comes from."""
+    """One of the processes; a thread takes what it says. Each has a way of its own: one that is killed blocks no other's."""
 
-    process: SpawnProcess
-    reports: Connection
+    def __init__(self, process: SpawnProcess, said: Connection) -> None:
+        self.process = process
+        self.report: _Report | None = None
+        self._said = said
+        self._thread = threading.Thread(target=self._take, daemon=True)
+        self._thread.start()
 
-    def report(self) -> _Report | None:
-        """Of one that has ended."""
-        try:
-            return self.reports.recv() if self.reports.poll() else None
-        except EOFError:
-            return None
+    def end(self) -> None:
+        """End it if it has not ended, and take the rest."""
+        self.process.kill()
+        self.process.join()
+        self._thread.join()
+
+    def _take(self) -> None:
+        """Log its records as if they were of this process; keep its report."""
+        while True:
+            try:
+                message = self._said.recv()
+            except (EOFError, OSError, UnpicklingError):  # it has ended, perhaps in the middle of a word
+                return
+            if isinstance(message, _Report):
+                self.report = message
+            else:
+                logger = logging.getLogger(message.name)
+                if logger.isEnabledFor(message.levelno):
+                    logger.handle(message)
 
 
 def run_processes(work: Callable[[Share], None], count: int) -> None:
@@ -139,28 +157,22 @@ def run_processes(work: Callable[[Share], None], count: int) -> None:
         Exception: The first that one of them raised.
     """
     context = multiprocessing.get_context("spawn")
-    records: Queue[logging.LogRecord] = context.Queue()
-    listener = QueueListener(records, _HereLogged())
     members: list[_Member] = []
     port = find_free_network_port()
-    listener.start()
     try:
         for number in range(count):
             here, there = context.Pipe(duplex=False)
-            place = (Share(number, count), port)
-            process = context.Process(target=_work, args=(work, *place, records, there))
+            process = context.Process(target=_work, args=(work, Share(number, count), port, there))
             with _signals_later():  # until the process has its own answer to them
                 process.start()
             there.close()
             members.append(_Member(process, here))
         _await(members)
-        _raise_first(members)
+        codes = [member.process.exitcode or 0 for member in members]  # before those left are ended
     finally:
         for member in members:
-            member.process.kill()
-            member.process.join()
-        listener.stop()
-        records.close()
+            member.end()
+    _raise_first(codes, [member.report for member in members if member.report is not None])
 
 
 def _await(members: Sequence[_Member]) -> None:
@@ -179,14 +191,12 @@ def _await(members: Sequence[_Member]) -> None:
             return
 
 
-def _raise_first(members: Sequence[_Member]) -> None:
+def _raise_first(codes: Sequence[int], reports: Sequence[_Report]) -> None:
     """Raise what ended them: a kill that nobody asked for, or the first error."""
-    reports = [report for member in members if (report := member.report()) is not None]
-    for number, member in enumerate(members):
-        code = member.process.exitcode or 0
+    for number, code in enumerate(codes):
         if code < 0 and requested() is None:
             raise CharNeRFError(
-                f"process {number} of {len(members)} was ended by {signal.Signals(-code).name}, expected all to live; was there"
+                f"process {number} of {len(codes)} was ended by {signal.Signals(-code).name}, expected all to live; was there"
                 " memory enough? The same command goes on, a single run's with its hydra.run.dir and ckpt_path=last."
             )
     for report in sorted(reports, key=lambda report: report.time):
@@ -203,13 +213,19 @@ def _signals_later() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _work(
-    work: Callable[[Share], None],
-    share: Share,
-    port: int,
-    records: "Queue[logging.LogRecord]",
-    reports: Connection,
-) -> None:
+class _Voice(QueueHandler):
+    """Says log records to the process that began this one; a handler's lock lets one thread speak at a time."""
+
+    def __init__(self, said: Connection) -> None:
+        super().__init__(SimpleQueue())  # which stays empty
+        self.said = said
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        """Say one."""
+        self.said.send(record)
+
+
+def _work(work: Callable[[Share], None], share: Share, port: int, said: Connection) -> None:
     """What one of the processes does."""
     parent = multiprocessing.parent_process()
     if parent is None or os.getppid() != parent.pid:
@@ -218,7 +234,8 @@ def _work(
     os.environ |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port), "LOCAL_RANK": str(share.process)}
     root = logging.getLogger()
     root.setLevel(logging.INFO)
-    root.addHandler(QueueHandler(records))
+    voice = _Voice(said)
+    root.addHandler(voice)
     failure: BaseException | None = None
     try:
         with listening(in_worker=True), first_speaks(share):
@@ -228,9 +245,8 @@ def _work(
         failure = error
     if failure is None:
         return
-    reports.send(_Report(time.monotonic(), _portable(failure)))
-    records.close()
-    records.join_thread()
+    voice.acquire()
+    said.send(_Report(time.monotonic(), _portable(failure)))
     os._exit(1)  # an ordinary end would wait for workers, and for processes that have failed
 
 
@@ -247,13 +263,3 @@ def _portable(error: BaseException) -> BaseException:
     if not isinstance(error, Stopped):
         portable.add_note("".join(traceback.format_exception(error)))
     return portable
-
-
-class _HereLogged(logging.Handler):
-    """Logs records of other processes as if they were of this one."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Hand a record to the handlers here."""
-        logger = logging.getLogger(record.name)
-        if logger.isEnabledFor(record.levelno):
-            logger.handle(record)
