@@ -13,7 +13,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from logging.handlers import QueueHandler
 from multiprocessing.connection import Connection, wait
@@ -183,7 +183,8 @@ def _await(members: Sequence[_Member]) -> None:
         if requested() is not None and passed is None:
             passed = requested()
             for process in running:
-                os.kill(process.pid or 0, passed or signal.SIGTERM)
+                assert process.pid is not None
+                os.kill(process.pid, passed or signal.SIGTERM)
         failed = [one for one in members if one.process.exitcode not in (None, 0)]
         if failed and end is None:
             end = time.monotonic() + PATIENCE
@@ -221,8 +222,9 @@ class _Voice(QueueHandler):
         self.said = said
 
     def enqueue(self, record: logging.LogRecord) -> None:
-        """Say one."""
-        self.said.send(record)
+        """Say one, unless nobody listens any more."""
+        with suppress(OSError):
+            self.said.send(record)
 
 
 def _work(work: Callable[[Share], None], share: Share, port: int, said: Connection) -> None:
@@ -246,7 +248,8 @@ def _work(work: Callable[[Share], None], share: Share, port: int, said: Connecti
     if failure is None:
         return
     voice.acquire()
-    said.send(_Report(time.monotonic(), _portable(failure)))
+    with suppress(OSError):
+        said.send(_Report(time.monotonic(), _portable(failure)))
     os._exit(1)  # an ordinary end would wait for workers, and for processes that have failed
 
 
