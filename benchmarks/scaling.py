@@ -12,11 +12,13 @@ import torch
 
 from benchmarks.grids import CUBE_SIDE, grid_sampler
 from charnerf.bench.subjects import Pictured, Subject
-from charnerf.bench.workbench import ADAPTIVE, CULLED, Workbench
+from charnerf.bench.sweep import FACTORS
+from charnerf.bench.workbench import ADAPTIVE, BAKED, CULLED, TOLERANCE, Workbench
 from charnerf.evaluation.timing import Stopwatch
 from charnerf.geometry.resizing import resized_cameras
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import SourceViews
+from charnerf.volume.renderers.baked import BakedRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 
 IMAGE_SIDES, GRID_SIDES, VIEWS, CHARACTERS, SAMPLES = (
@@ -94,17 +96,24 @@ def growths(bench: Workbench, subject: Subject, pictured: Sequence[Pictured]) ->
         pictured: Several, of one drawing size.
     """
     device, views = subject.truth.device, _more_views(subject)
-    adaptive = bench.renderers[ADAPTIVE]
+    adaptive, baked = bench.renderers[ADAPTIVE], bench.renderers[BAKED]
+    scene = baked.prepared(subject.scene)
 
     def picture(size: int) -> Callable[[], Any]:
         return lambda: adaptive.render_camera(subject.scene, resized_cameras(subject.camera, size, size))
+
+    def baked_picture(size: int) -> Callable[[], Any]:
+        return lambda: baked.render_camera(scene, resized_cameras(subject.camera, size, size))
+
+    def baked_grid(factor: int) -> Callable[[], Any]:
+        return lambda: BakedRenderer(**bench.like, tolerance=TOLERANCE, factor=factor).prepared(subject.scene)
 
     def grid(size: int) -> Callable[[], Any]:
         return lambda: grid_sampler(subject, size, 8).evaluate_surface(50.0)
 
     def seen_by(count: int) -> Callable[[], Any]:
-        scene = _scene(bench.network, views[:, :count])
-        return lambda: bench.renderers[CULLED].render(scene, subject.rays)
+        seen = _scene(bench.network, views[:, :count])
+        return lambda: bench.renderers[CULLED].render(seen, subject.rays)
 
     def encode(count: int) -> Callable[[], Any]:
         batch = SourceViews.joined([pictured[i % len(pictured)].views for i in range(count)])
@@ -116,6 +125,8 @@ def growths(bench: Workbench, subject: Subject, pictured: Sequence[Pictured]) ->
 
     return [
         grow("image side, pixels (adaptive)", {n: picture(n) for n in IMAGE_SIDES}, device),
+        grow("image side, pixels (baked)", {n: baked_picture(n) for n in IMAGE_SIDES}, device),
+        grow("steps of the baked grid in a pixel", {n: baked_grid(n) for n in FACTORS}, device),
         grow(f"grid cells along {CUBE_SIDE} m (sparse)", {n: grid(n) for n in GRID_SIDES}, device),
         grow("source views (culled)", {n: seen_by(n) for n in VIEWS}, device),
         grow("characters (encode)", {n: encode(n) for n in CHARACTERS}, device),

@@ -27,7 +27,7 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 from charnerf.config.foreign import parse_json
@@ -99,11 +99,8 @@ def save_baked(path: str | Path, hero: Hero) -> Path:
         "head": head,
     }
     with write_aside(file) as aside:
-        save_file(
-            {name: one.detach().cpu().contiguous() for name, one in tensors.items()},
-            aside,
-            metadata={"format": FORMAT, "baked": json.dumps(facts)},
-        )
+        whole = {name: one.detach().cpu().contiguous() for name, one in tensors.items()}
+        aside.write_bytes(save(whole, metadata={"format": FORMAT, "baked": json.dumps(facts)}))
     return file
 
 
