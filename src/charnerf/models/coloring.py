@@ -32,10 +32,12 @@ class DrawnColoring(AbstractColoring, MovableRecord):
     pictures: Pictures
 
     def rgb_of(self, points: Tensor, appearance: Tensor) -> Tensor:
-        """Colours (P, 3) of points (P, 3) of an appearance (P, C)."""
+        """Colours (P, ..., 3) of points (P, 3) of appearances (P, ..., C): the drawings are read once a point."""
         pixels, _, _ = project_into_all(self.cameras, points)
         uv = pixels / pixels.new_tensor((self.cameras.width, self.cameras.height))
-        return self.head.rgb_of(appearance, self.pictures.read(uv))
+        drawn, flat = self.pictures.read(uv), appearance.reshape(-1, appearance.shape[-1])
+        rgb = self.head.rgb_of(flat, drawn.repeat_interleave(len(flat) // max(1, len(drawn)), dim=0))
+        return rgb.view(*appearance.shape[:-1], 3)
 
     def at_width(self, width: int) -> "DrawnColoring":
         """By the detailed drawings, so many pixels wide; by the encoded ones where those are as wide."""

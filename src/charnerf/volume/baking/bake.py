@@ -253,13 +253,8 @@ def _colors(scene: Scene, coarse: _Coarse) -> tuple[Tensor, Tensor]:
         parts = field.appearance(some, directions)  # (P, K, C)
         coefficients = torch.einsum("bk,pkc->pbc", into, parts)
         fitted = torch.einsum("kb,pbc->pkc", back, coefficients)
-        off = [
-            (coloring.rgb_of(some, one) - coloring.rgb_of(some, other)).abs().amax(-1)
-            for one, other in zip(parts.unbind(1), fitted.unbind(1), strict=True)
-        ]
-        rows.append(
-            torch.cat((coefficients.flatten(1), torch.stack(off).square().mean(0).sqrt()[:, None]), dim=-1)
-        )
+        off = (coloring.rgb_of(some, parts) - coloring.rgb_of(some, fitted)).abs().amax(-1)
+        rows.append(torch.cat((coefficients.flatten(1), off.square().mean(-1, keepdim=True).sqrt()), dim=-1))
     filled = torch.cat((torch.zeros_like(rows[0][:1]), *rows))
     filled[1:, -1] += _missed_between(scene, coarse, index, filled)[wanted]
     return index, filled
