@@ -37,10 +37,10 @@ from charnerf.training.run import training_renderer
 
 CHARACTERS, VIEWS, SIZE = 20, 12, 128  # of the set that is trained on
 HELD = 2  # characters of the window, a tenth
-EXCHANGED = 16  # steps, as `batches.window_steps`
+EXCHANGED = 32  # steps, as `batches.window_steps`
 TURNS, STEPS = 2, 32
 CAPTURED = 2  # characters, by each number of views
-SHARD_MIB = 1.0
+SHARD_MIB = 0.3  # two characters
 
 
 @dataclass(frozen=True)
@@ -158,9 +158,9 @@ def dataset_rows(folder: Path) -> list[Row]:
 
 
 def _in_turns(ways: dict[str, Callable[[], float]]) -> dict[str, float]:
-    """The median of a few turns, taken one after the other, after one that warms up."""
+    """The mean of a few turns, taken one after the other, after one that warms up; as many characters come in each."""
     turns = [{name: measure() for name, measure in ways.items()} for _ in range(TURNS + 1)][1:]
-    return {name: statistics.median(turn[name] for turn in turns) for name in ways}
+    return {name: statistics.mean(turn[name] for turn in turns) for name in ways}
 
 
 class _Training:

@@ -17,6 +17,7 @@ from charnerf.data.silhouettes import SilhouetteSpace
 from charnerf.data.store import CharacterStore
 from charnerf.data.surface import AreaSurface
 from charnerf.data.validation import ValidationDataset, spread_frames
+from charnerf.data.window import Window, groups_of
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
 from charnerf.geometry.hull import build_hull, occupied_edges
@@ -81,6 +82,18 @@ def same(one: TrainBatch, other: TrainBatch) -> bool:
             (one.space.points, other.space.points),
         )
     )
+
+
+def test_batches_are_drawn_from_the_window_by_every_process(store):
+    """Two processes of one character each make what one makes of two; a window of one shows one character for a while."""
+    window = Window(groups_of(NAMES, None), held=1, steps=3, seed=5)
+    for step in range(9):
+        alone = dataset_of(store, window=window, characters=2)[request(step)]
+        shares = [
+            dataset_of(store, window=window, share=Share(process, 2))[request(step)] for process in (0, 1)
+        ]
+        assert set(alone.names) == set(window.names(step))
+        assert alone.names == tuple(name for share in shares for name in share.names)
 
 
 def test_the_same_request_makes_the_same_batch(figure_dataset, store):

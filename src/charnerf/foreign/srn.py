@@ -32,10 +32,13 @@ class Srn(AbstractFormat):
         """Objects in the folder, in folders of splits, and one folder deeper, as srn_chairs has them."""
         if _is_object(root):
             return found_in([root])
-        found = found_in(filter(_is_object, folders_in(root)), _split_of(root))
-        for folder in folders_in(root):
-            for place in (folder, *folders_in(folder)):
-                found += found_in(filter(_is_object, folders_in(place)), _split_of(folder))
+        objects, others = _parted(root)
+        found = found_in(objects, _split_of(root))
+        for folder in others:
+            objects, deeper = _parted(folder)
+            found += found_in(objects, _split_of(folder))
+            for place in deeper:
+                found += found_in(_parted(place)[0], _split_of(folder))
         return found
 
     def shots(self, one: Found) -> list[Shot]:
@@ -114,6 +117,14 @@ def _intrinsics(file: Path) -> tuple[float, tuple[float, float], tuple[float, fl
 
 def _is_object(folder: Path) -> bool:
     return (folder / INTRINSICS).is_file() and (folder / "rgb").is_dir() and (folder / "pose").is_dir()
+
+
+def _parted(folder: Path) -> tuple[list[Path], list[Path]]:
+    """The folders in a folder that are objects, and the others; objects, which hold hundreds of files, are not looked into."""
+    inner = folders_in(folder)
+    are = [_is_object(one) for one in inner]
+    objects = [one for one, is_one in zip(inner, are, strict=True) if is_one]
+    return objects, [one for one, is_one in zip(inner, are, strict=True) if not is_one]
 
 
 def _split_of(folder: Path) -> str:
