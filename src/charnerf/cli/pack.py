@@ -42,6 +42,6 @@ def command(
     size = sum(shard.size for shard in index.shards)
     each = size / max(count, 1) / 1024
     say(
-        f"{output}: {count} characters in {len(index.shards)} shards, {size / 2**20:.1f} MiB, {each:.0f} KiB a character."
+        f"{output}: characters: {count}, shards: {len(index.shards)}, {size / 2**20:.1f} MiB, {each:.0f} KiB a character."
         f" Next: python train.py data=shards data.root={output}"
     )
