@@ -7,10 +7,11 @@ from PIL import Image, ImageDraw, ImageFont
 from charnerf.drawings.align import figure_box, half_extent, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array
-from charnerf.drawings.naming import name_views
+from charnerf.drawings.naming import Naming, name_views
 from charnerf.drawings.read_sheet import read_sheet
 from charnerf.drawings.sheet import find_figures
-from charnerf.drawings.viewpoints import Viewpoint, viewpoint
+from charnerf.drawings.turnaround import read_views
+from charnerf.drawings.viewpoints import Viewpoint, between_square_ones, viewpoint
 from charnerf.errors import DataError
 from support.painted import paint
 
@@ -156,6 +157,25 @@ def test_a_sheet_is_read_whole():
     assert "3 figures" in read.assumptions[0] and "1 front, 2 left, 3 back" in read.assumptions[0]
     assert "a swatch or a panel (4)" in read.assumptions[1] and not read.warnings
     assert (read.picture == (220, 40, 40)).all(-1).sum() > 500
+
+
+def test_what_lies_between_square_views_is_left_out_where_these_are_whole(monkeypatch):
+    front, left, back, between = (Viewpoint(azimuth) for azimuth in (0.0, 90.0, 180.0, 45.0))
+    assert between_square_ones([front, left, back, between]) == [between]
+    assert between_square_ones([front, between, back]) == between_square_ones([front, left, between]) == []
+    pixels, _ = sheet(["front", "side", "back", "right"])
+    found = Naming(viewpoints=(front, left, back, between), is_doubtful=False, reasons=())
+    monkeypatch.setattr("charnerf.drawings.read_sheet.name_views", lambda canvases: found)
+    read = read_sheet(pixels)
+    assert list(read.drawings) == [front, left, back]
+    assert any(
+        "which the weights were trained on: 4 (--figure three-quarter-front=4" in line
+        for line in read.assumptions
+    )
+    taken = read_sheet(pixels, figures={"three-quarter-front": 4})
+    assert between in taken.drawings
+    told = read_views(taken.drawings, size=64).warnings
+    assert sum("three-quarter-front: seen from between" in line for line in told) == 1
 
 
 def test_names_can_be_given():

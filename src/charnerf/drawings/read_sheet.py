@@ -14,7 +14,7 @@ from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.naming import MOST_NAMED, looks_left, name_views
 from charnerf.drawings.sheet import Sheet, find_figures
-from charnerf.drawings.viewpoints import Viewpoint, viewpoint
+from charnerf.drawings.viewpoints import Viewpoint, between_square_ones, viewpoint
 from charnerf.errors import DataError
 from charnerf.pictures import bytes_on_white, to_bytes
 
@@ -81,6 +81,7 @@ def read_sheet(
             f"{drawing.name}: {count} figures, from the left, row by row: "
             + ", ".join(f"{index + 1} {_name(view)}" for index, view in views.items())
             + ".",
+            *([] if order or figures else _between(views)),
             *_asides(sheet),
         ),
         warnings=tuple(_warnings(drawing, canvases, chosen, doubtful, shown)),
@@ -116,7 +117,7 @@ def _views(
     if order:
         views |= {i: None if name == "-" else _named(name, canvases[i]) for i, name in enumerate(order)}
     elif naming is not None:
-        views |= dict(enumerate(naming.viewpoints))
+        views |= dict(enumerate(_square(naming.viewpoints)))
     for name, number in figures.items():
         if not 1 <= number <= count:
             raise DataError(f"--figure {name}={number}: found no such figure, expected 1 to {count}.")
@@ -126,11 +127,28 @@ def _views(
     return views, naming is not None and naming.is_doubtful and not figures
 
 
+def _square(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint | None]:
+    """The viewpoints, without those between them where front, back and a side are there: see `between_square_ones`."""
+    left_out = between_square_ones(viewpoints)
+    return [None if one in left_out else one for one in viewpoints]
+
+
 def _named(name: str, canvas: np.ndarray) -> Viewpoint:
     """A viewpoint by its name; `side` looks whichever way the figure does."""
     if name != "side":
         return viewpoint(name)
     return viewpoint("left" if looks_left(canvas) else "right")
+
+
+def _between(views: Mapping[int, Viewpoint | None]) -> list[str]:
+    """That figures between the square views were left out, and how to take one."""
+    numbers = [str(index + 1) for index, view in views.items() if view is None]
+    if not numbers:
+        return []
+    return [
+        f"Left out, as seen from between front, side and back, which the weights were trained on: {', '.join(numbers)}"
+        f" (--figure three-quarter-front={numbers[0]} takes it)."
+    ]
 
 
 def _name(view: Viewpoint | None) -> str:

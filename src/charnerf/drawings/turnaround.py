@@ -16,7 +16,7 @@ from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.picture import draw_assumptions
-from charnerf.drawings.viewpoints import Viewpoint
+from charnerf.drawings.viewpoints import Viewpoint, between_square_ones
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
 from charnerf.geometry.framing import framing_cameras
@@ -242,7 +242,12 @@ def _doubts(
 ) -> tuple[str, ...]:
     """What looks wrong."""
     small = _small_figures(figures, extent, canvases[0].shape[0])
-    return (*small, *_disagreements(agreement, figures), *_other_designs(canvases, figures))
+    between = [
+        f"{one.name}: seen from between front, side and back, which the released weights were trained on: with it pictures came out"
+        " worse (docs/drawings.md). Compare without it."
+        for one in between_square_ones([figure.viewpoint for figure in figures])
+    ]
+    return (*small, *_disagreements(agreement, figures), *_other_designs(canvases, figures), *between)
 
 
 def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:

@@ -1,6 +1,7 @@
 """From where a drawing shows its character: names that artists use, and angles."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -58,6 +59,17 @@ class Viewpoint:
                     return name
             return f"{self.azimuth_deg:g} degrees"
         return f"{self.azimuth_deg:g},{self.elevation_deg:g} degrees"
+
+
+def between_square_ones(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint]:
+    """Those that look neither from the front nor a side nor the back, where all three of these are there; else none.
+
+    The released weights were trained on the three; a view between them costs more than it shows (docs/drawings.md).
+    """
+    azimuths = {one.azimuth_deg for one in viewpoints}
+    if not ({0.0, 180.0} <= azimuths and azimuths & {90.0, 270.0}):
+        return []
+    return [one for one in viewpoints if one.azimuth_deg % 90.0]
 
 
 def viewpoint(text: str | float) -> Viewpoint:
