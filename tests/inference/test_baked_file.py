@@ -70,6 +70,7 @@ def _contents(file):
         ("grid.rows", lambda one: one[:, :2].contiguous(), "grid.rows: found"),
         ("grid.gaps", lambda one: one[:-1].contiguous(), "grid.index: found"),
         ("grid.color_rows", lambda one: one[:, 1:].contiguous(), "grid.color_rows: found"),
+        ("views.present", lambda one: one.float(), "views: found images"),
         ("drawn.encoded", None, "lacks a part of a baked character"),
         ("drawn.focal", lambda one: one[:1].contiguous(), "lacks a part of a baked character"),
     ],
@@ -91,6 +92,9 @@ def test_other_files_are_refused(file, tmp_path):
         load_baked(other)
     facts = {**json.loads(metadata["baked"]), "factor": 10**9}
     save_file(tensors, other, metadata={**metadata, "baked": json.dumps(facts)})
+    with pytest.raises(DataError, match="expected pitch, factor"):
+        load_baked(other)
+    save_file(tensors, other, metadata={**metadata, "baked": "[1]"})
     with pytest.raises(DataError, match="expected pitch, factor"):
         load_baked(other)
     other.write_bytes(b"no tensors")

@@ -188,7 +188,8 @@ def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
             f"{file}: found format {metadata.get('format')!r} in its metadata, expected {FORMAT!r}; write one with "
             "`charnerf reconstruct --bake FILE`."
         )
-    facts = parse_json(metadata.get("baked", ""), str(file))
+    read = parse_json(metadata.get("baked", ""), str(file))
+    facts = read if isinstance(read, dict) else {}
     numbers = {name: facts.get(name) for name in ("pitch", "tolerance", "radius")}
     sound = all(isinstance(one, int | float) and 0 <= one < math.inf for one in numbers.values())
     factor, head = facts.get("factor"), facts.get("head")
@@ -238,5 +239,14 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
             raise DataError(
                 f"{file}: grid.{name}: found rows {low} to {high}, expected 0 to {len(rows) - 1}."
             )
-    if views.images.ndim != len("BVCHW") or views.present.shape != views.images.shape[:2]:
-        raise DataError(f"{file}: views: found {tuple(views.images.shape)}, expected (1, V, 4, H, W).")
+    marks = (views.present, views.mirrored)
+    whole = (
+        views.images.ndim == len("BVCHW")
+        and views.images.shape[0] == 1
+        and views.images.shape[2] == len("RGBA")
+    )
+    if not whole or any(one.dtype != torch.bool or one.shape != views.images.shape[:2] for one in marks):
+        raise DataError(
+            f"{file}: views: found images {tuple(views.images.shape)}, expected (1, V, 4, H, W), and present and mirrored (1, V) "
+            "of booleans."
+        )
