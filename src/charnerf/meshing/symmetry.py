@@ -80,6 +80,10 @@ class SymmetricField(AbstractField):
         """Colours (Q, 3)."""
         return self(state.points, state.view_dirs).rgb
 
+    def lattice(self, low: Tensor, high: Tensor) -> tuple[Tensor, float]:
+        """As the field's."""
+        return self.scene.field.lattice(low, high)
+
     def at_width(self, width: int) -> AbstractField:
         """Colours from drawings so many pixels wide."""
         return SymmetricField(self.scene.at_width(width))

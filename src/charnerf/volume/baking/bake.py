@@ -168,7 +168,8 @@ class _Coarse:
         """What its grid takes, about, MiB."""
         colors = int(corners_of(self.refined).sum()) * NUM_POLYNOMIALS * TYPICAL_VALUES if has_colors else 0
         points = int(finer_points(self.holding, factor).sum())
-        return 4.0 * (self.u.numel() * factor**3 + 3 * points + colors) / 2**20
+        indices = self.u.numel() * (factor**3 + 1 + 0.25)  # of both grids, and the gaps
+        return 4.0 * (indices + 3 * points + colors) / 2**20
 
 
 def _asked(scene: Scene, points: Tensor) -> tuple[Tensor, Tensor]:
