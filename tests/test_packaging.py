@@ -9,12 +9,17 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 
 import charnerf
 from charnerf.config.options import conf_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+WORKFLOW = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
 
 
 def test_every_public_name_is_there_and_imported_late() -> None:
@@ -72,9 +77,52 @@ def test_ci_runs_what_the_readme_says() -> None:
     test = re.search(r"^ {4}(python -m pip install .* && python -m pytest -n auto)$", readme, re.MULTILINE)
     assert test is not None
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8").replace(" --quiet", "")
-    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
     assert "set -euo pipefail" in script
     for step in (*test[1].split(" && "), "ruff check .", "ruff format --check .", "mypy"):
         assert f"\n{step}\n" in script
-        assert step in workflow
+        assert step in WORKFLOW
     assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
+
+
+def locked() -> dict[str, list[str]]:
+    """Versions in the lock file by package; one that differs between Pythons stands there more than once."""
+    found: dict[str, list[str]] = {}
+    for name, version in re.findall(
+        r"^([a-z0-9][a-z0-9.-]*)==([^\s;]+)(?: ;.*)? \\\n {4}--hash=sha256:", LOCK, re.MULTILINE
+    ):
+        found.setdefault(name, []).append(version)
+    return found
+
+
+def needed(extra: str) -> list[Requirement]:
+    """What the package and an extra need, those extras that it names with it."""
+    optional, waiting, found = PROJECT["project"]["optional-dependencies"], [extra], []
+    while waiting:
+        for text in optional[waiting.pop()]:
+            one = Requirement(text)
+            waiting += one.extras if one.name == "charnerf" else ()
+            found += [] if one.name == "charnerf" else [one]
+    return [*map(Requirement, PROJECT["project"]["dependencies"]), *found]
+
+
+def test_the_lock_file_holds_all_that_the_tests_need() -> None:
+    versions = locked()
+    for one in needed("test"):
+        assert all(one.specifier.contains(version) for version in versions[one.name]), one
+
+
+def test_the_lock_file_has_a_hash_for_every_package_and_names_no_host() -> None:
+    packages = [line for line in LOCK.splitlines() if line and line[0] not in "# "]
+    assert len(packages) == sum(map(len, locked().values())) > 100
+    assert "://" not in LOCK
+
+
+def test_the_oldest_and_the_newest_versions_are_tested_too() -> None:
+    matrix = yaml.safe_load(WORKFLOW)["jobs"]["test"]["strategy"]["matrix"]
+    tested = {(one, "newest") for one in matrix["python-version"]}
+    tested |= {(one["python-version"], one["versions"]) for one in matrix["include"]}
+    allowed = SpecifierSet(PROJECT["project"]["requires-python"])
+    pythons = [one for one in ("3.10", "3.11", "3.12", "3.13", "3.14") if allowed.contains(one)]
+    assert tested == {(one, "newest") for one in pythons} | {(pythons[0], "oldest"), ("3.12", "locked")}
+    for one in map(Requirement, PROJECT["project"]["dependencies"]):  # what `oldest` and `newest` mean
+        assert any(bound.operator == ">=" for bound in one.specifier), one
