@@ -155,7 +155,7 @@ def test_what_was_typed_is_kept_once_a_run_is_accepted(figure_dataset, tmp_path,
     monkeypatch.setattr(sys, "argv", ["train.py"])
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
     with monkeypatch.context() as patch:
-        patch.setattr(run_module, "run_training", lambda cfg, folder, *, accepted: accepted())
+        patch.setattr(run_module, "run_training", lambda cfg, folder, *, accepted, **_: accepted())
         assert train([*typed, "seed=1"]) == 0
     kept = {file.name: file.read_text() for file in (tmp_path / ".hydra").iterdir()}
     assert (

@@ -1,5 +1,6 @@
 """`charnerf search`: which configs give the least error for their seconds."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -7,6 +8,7 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.options import Folder
+from charnerf.cli.train import begin_process
 
 Overrides = Annotated[
     list[str],
@@ -40,20 +42,18 @@ def command(
     from charnerf.config.options import conf_folder
     from charnerf.config.search_space import search_space
     from charnerf.files import check_folder
-    from charnerf.process import keep_freed_memory, leave_disk_errors_to_callers, use_fastest_products
     from charnerf.training.grid import begin_grid, check_grid, report_grid
+    from charnerf.training.run import run_training
     from charnerf.training.search import Search
 
     space = search_space(overrides, conf_folder())
     for probe in space.probes():
         check_command_line(probe, conf=conf_folder())
     check_folder(output)
-    keep_freed_memory()
-    use_fastest_products()
-    leave_disk_errors_to_callers()
+    begin_process()
     search = Search(output, space, seconds=seconds, seed=seed)
     since = begin_grid(output)
-    search.run(trials, compose_config)
+    search.run(trials, compose_config, train=partial(run_training, begin_process=begin_process))
     report: Path | None = report_grid(output)
     say(f"front: {search.write_front()}{f'; report: {report}' if report else ''}")
     check_grid(output, since=since)

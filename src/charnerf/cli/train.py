@@ -121,7 +121,7 @@ def run_job(cfg: "DictConfig") -> None:
 
 
 def _run_job(cfg: "DictConfig") -> None:
-    _begin_process()
+    begin_process()
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
 
@@ -135,7 +135,7 @@ def _run_job(cfg: "DictConfig") -> None:
     job = HydraConfig.get()
     validate(cfg, trusted_targets=trusted_by(list(job.overrides.task)))
     folder = Path(job.runtime.output_dir)
-    train = partial(run_training, begin_process=_begin_process)
+    train = partial(run_training, begin_process=begin_process)
     if job.mode is RunMode.MULTIRUN:
         check_alone(cfg)
         run_cell(cfg, Path(job.sweep.dir), name=job.job.override_dirname, job_folder=folder, train=train)
@@ -143,7 +143,7 @@ def _run_job(cfg: "DictConfig") -> None:
         train(cfg, folder, accepted=partial(save_job, folder, cfg))
 
 
-def _begin_process() -> None:
+def begin_process() -> None:
     """Set the process: this one, or one that a training on several devices begins."""
     keep_freed_memory()
     use_fastest_products()
