@@ -311,11 +311,11 @@ def test_train_itself_exits_2(door: list[str], tmp_path: Path) -> None:
 
 
 NO_TRAINING = """
-import functools, sys
-from charnerf.training import cells
-cells.run_cell = functools.partial(cells.run_cell, train=lambda cfg, folder: None)
-from charnerf.cli import run
-sys.exit(run(["train", *sys.argv[1:]]))
+import sys
+from charnerf.training import run
+run.run_training = lambda cfg, folder, **settings: None
+from charnerf import cli
+sys.exit(cli.run(["train", *sys.argv[1:]]))
 """
 
 
