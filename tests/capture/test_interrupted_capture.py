@@ -18,6 +18,7 @@ from charnerf.data.digest import split_digest, training_digest
 from charnerf.data.layout import read_dataset
 from charnerf.errors import DataError
 from charnerf.interruption import Stopped, listening
+from charnerf.wording import counted
 
 TINY = CaptureOptions(views=2, size=16)
 
@@ -123,6 +124,6 @@ def test_the_command_stops_with_its_workers_and_goes_on(boxes, tmp_path, number,
     assert 1 <= len(there) < 44
     again = subprocess.run(command, capture_output=True, check=False)
     assert again.returncode == 0, again.stderr.decode()
-    assert f"{len(there)} characters are there from the same capture".encode() in again.stderr
+    assert f"{counted(len(there), 'character')} skipped: there from the same capture".encode() in again.stderr
     assert len(read_dataset(root).splits["train"]) == 44
     assert not [path for path in root.iterdir() if path.name.startswith(".")]

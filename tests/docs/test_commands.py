@@ -221,7 +221,7 @@ def _flat(content: object, before: str = "") -> Iterator[str]:
 @pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
 def test_every_key_option_and_path_is_there(page: Path, keys: set[str]) -> None:
     options = {name for command in (DOOR, *COMMANDS.values()) for one in command.params for name in one.opts}
-    options.add("--help")
+    options |= {"--help", "--config-dir", "--config-path"}  # the last two are Hydra's
     for text in inline(page):
         for word in text.split():
             key, is_value, value = word.lstrip("+'").partition("=")

@@ -63,7 +63,7 @@ def test_a_failed_cell_is_recorded_and_tried_again(tmp_path):
     assert "Traceback" in text and "found nan" in text
     cell(tmp_path, Trainer(), seed=1)
     with pytest.raises(
-        GridError, match=r"1 of 2 cells are not done(.|\n)*failed, ArithmeticError: loss: found nan"
+        GridError, match=r"1 of 2 cells not done(.|\n)*failed, ArithmeticError: loss: found nan"
     ):
         check_grid(tmp_path)
     assert cell(tmp_path, Trainer()).state == "done"
