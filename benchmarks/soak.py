@@ -90,7 +90,8 @@ def soak(
     work: Sequence[Callable[[], object]], *, seconds: float, least: int, note: Callable[[Held], None]
 ) -> list[Held]:
     """Do all the work round by round, for so many seconds and rounds at least; `note` gets what is held after each."""
-    begun, rounds = time.monotonic(), []
+    rounds: list[Held] = []
+    begun = time.monotonic()
     while len(rounds) < least or time.monotonic() - begun < seconds:
         for one in work:
             one()
@@ -156,8 +157,8 @@ def _capture_anew(meshes: Sequence[Path], root: Path) -> None:
 def _reconstruct(dataset: Path, file: Path) -> None:
     """With the released weights, loaded anew."""
     name = read_dataset(dataset).splits["test"][0]
-    drawings = {view: dataset / name / "sources" / f"{view}.png" for view in ("front", "side", "back")}
-    hero = weights.load().encode(**drawings)
+    front, side, back = (dataset / name / "sources" / f"{view}.png" for view in ("front", "side", "back"))
+    hero = weights.load().encode(front=front, side=side, back=back)
     assert np.isfinite(hero.render(azimuth_deg=45, size=64)).all()
     save_mesh(hero.mesh(resolution=48, num_cameras=2, faces=2000), file)
 
