@@ -6,7 +6,7 @@ bins with large errors cut into three, their samples kept, until the estimate is
 """
 
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import torch
 from torch import Tensor
@@ -71,16 +71,15 @@ class AdaptiveRenderer(AbstractRenderer):
         memory_mib: float,
         tolerance: float,
     ) -> None:
-        settings: dict[str, Any] = {
-            "quadrature": quadrature,
-            "num_coarse": num_coarse,
-            "num_fine": num_fine,
-            "hull_steps": hull_steps,
-            "memory_mib": memory_mib,
-        }
-        super().__init__(**settings)
+        super().__init__(
+            quadrature=quadrature,
+            num_coarse=num_coarse,
+            num_fine=num_fine,
+            hull_steps=hull_steps,
+            memory_mib=memory_mib,
+        )
         self.tolerance = tolerance
-        self._culled = CulledRenderer(**settings)
+        self._culled = CulledRenderer(**self.settings)
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,) to the tolerance; with a generator or gradients as the culled renderer."""
