@@ -62,7 +62,7 @@ def test_foreign_sets(tmp_path: Path) -> None:
     cameras, images = sets.around(), sets.pictures(sets.around())
     sets.write_srn(tmp_path / "srn", cameras, images)
     sets.write_nerf_blender(tmp_path / "blender", sets.looking_along_z(cameras), images)
-    find = lambda folder: list(dataset_findings(folder, processes=1, examined=lambda _: None))  # noqa: E731
+    find = lambda folder: list(dataset_findings(folder, processes=1, counter=lambda total: lambda: None))  # noqa: E731
     assert find(tmp_path / "srn") == []
     assert faults(find(tmp_path / "blender")) == ["OpenCV for OpenGL cameras"]
     (tmp_path / "srn/pose/000003.txt").write_text("1 2 3")
@@ -104,7 +104,7 @@ def test_many_alike_are_told_once_and_masks_may_be_of_one_bit(tmp_path: Path) ->
     for file in (tmp_path / "set/masks").iterdir():
         with Image.open(file) as mask:
             mask.convert("1").save(file)
-    find = lambda: list(dataset_findings(tmp_path / "set", processes=1, examined=lambda _: None))  # noqa: E731
+    find = lambda: list(dataset_findings(tmp_path / "set", processes=1, counter=lambda total: lambda: None))  # noqa: E731
     assert find() == []
     for file in (tmp_path / "set/masks").iterdir():
         file.write_bytes(b"")

@@ -22,7 +22,7 @@ OPENGL_OF_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def found(root: Path) -> list[Finding]:
-    return list(dataset_findings(root, processes=1, examined=lambda _: None))
+    return list(dataset_findings(root, processes=1, counter=lambda total: lambda: None))
 
 
 def edited(folder: Path, change: Callable[[dict], object]) -> None:

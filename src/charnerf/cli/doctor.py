@@ -70,11 +70,10 @@ def command(
 
 def _findings(subject: list[Path], jobs: int | None, trusted: tuple[str, ...]) -> "Iterator[Finding]":
     """What is wrong with what was given, by what it is."""
-    from tqdm import tqdm
-
     from charnerf.doctor.characters import dataset_findings
     from charnerf.doctor.drawings import drawing_findings, drawings_in
     from charnerf.doctor.run import is_run, run_findings
+    from charnerf.progress import Progress
 
     first = subject[0]
     if len(subject) > 1 or first.is_file():
@@ -84,13 +83,8 @@ def _findings(subject: list[Path], jobs: int | None, trusted: tuple[str, ...]) -
     elif drawings := drawings_in(first):
         yield from drawing_findings(_named(drawings))
     else:
-        with tqdm(total=0, desc="examine", unit="character", delay=1.0) as bar:
-
-            def examined(total: int) -> None:
-                bar.total = total or bar.total
-                bar.update(0 if total else 1)
-
-            yield from dataset_findings(first, processes=jobs, examined=examined)
+        with Progress("examine") as progress:
+            yield from dataset_findings(first, processes=jobs, counter=progress.counter)
 
 
 def _by_view(files: list[Path]) -> "dict[Viewpoint, Path]":

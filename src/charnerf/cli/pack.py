@@ -28,17 +28,16 @@ def command(
     ] = 64,
 ) -> None:
     """Pack a data set into shards, tar files of many characters, for `data=shards` from a folder, HTTP or S3."""
-    from tqdm import tqdm
-
     from charnerf.data.layout import read_dataset
     from charnerf.data.packing import pack
     from charnerf.files import check_folder
+    from charnerf.progress import Progress
 
     root = data.opened()
     check_folder(output)
     count = len({name for names in read_dataset(root).splits.values() for name in names})
-    with tqdm(total=count, desc="pack", unit="character") as bar:
-        index = pack(root, output, shard_mib=shard_mib, packed=bar.update)
+    with Progress("pack") as progress:
+        index = pack(root, output, shard_mib=shard_mib, packed=progress.counter(count))
     size = sum(shard.size for shard in index.shards)
     each = size / max(count, 1) / 1024
     say(

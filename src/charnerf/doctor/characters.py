@@ -33,14 +33,14 @@ MOST_BYTES_HELD = 2**30  # of a character's pictures at once; further ones are n
 
 
 def dataset_findings(
-    root: Path, *, processes: int | None, examined: Callable[[int], object]
+    root: Path, *, processes: int | None, counter: Callable[[int], Callable[[], object]]
 ) -> Iterator[Finding]:
     """What is wrong with a data set, ours or foreign.
 
     Args:
         root: Its folder.
         processes: Worker processes; None for one a core.
-        examined: Told how many characters there are, and then of each 0.
+        counter: Gets how many characters there are; what it answers is called after each.
 
     Raises:
         DataError: If it is no data set at all.
@@ -58,9 +58,9 @@ def dataset_findings(
     else:
         form, found = recognised(root)
         patients = [partial(_of_foreign, form, one) for one in found]
-    examined(len(patients))
+    examined = counter(len(patients))
     for _, findings in in_processes(_examine, patients, processes):
-        examined(0)
+        examined()
         yield from findings
 
 

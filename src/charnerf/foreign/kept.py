@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from tqdm import tqdm
-
 from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import DATASET_FILE, DatasetInfo, write_dataset
@@ -22,6 +20,7 @@ from charnerf.foreign.reading import Reading
 from charnerf.foreign.shot import Shot
 from charnerf.foreign.srn import Srn
 from charnerf.foreign.transforms_json import TransformsJson
+from charnerf.progress import Progress
 
 log = logging.getLogger(__name__)
 
@@ -82,9 +81,10 @@ def kept_copy(
         remove_partial_characters(home)
         work = partial(_keep, home=home, form=form, reading=reading)
         errors = []
-        with tqdm(total=len(found), desc=f"read {root.name}", unit="character", delay=1.0) as bar:
+        with Progress(f"read {root.name}") as progress:
+            step = progress.counter(len(found))
             for _, error in in_processes(work, found, processes):
-                bar.update()
+                step()
                 errors += [error] if error else []
         if errors:
             shown = "\n  ".join(sorted(errors)[:_SHOWN_ERRORS])
