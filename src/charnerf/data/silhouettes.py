@@ -38,7 +38,7 @@ class SilhouetteSpace(AbstractSpace):
         return 0
 
     def sample(self, num_points: int, generator: torch.Generator) -> SpacePoints:
-        """Draw points; see `AbstractSpace.sample`."""
+        """Draw points; see `AbstractPoints.sample`."""
         points = hull_points(self.hull, CANDIDATES * num_points, generator)
         lowest = self._lowest_alpha(points)
         inside, outside = (lowest > 0.9).nonzero()[:, 0], (lowest < 0.1).nonzero()[:, 0]

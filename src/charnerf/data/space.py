@@ -1,6 +1,5 @@
 """Points in the hull labelled inside or outside of the character, and what draws them."""
 
-from abc import ABC, abstractmethod
 from typing import final
 
 import numpy as np
@@ -8,8 +7,11 @@ import torch
 from torch import Tensor
 
 from charnerf.data.characters import Character
+from charnerf.data.points import AbstractPoints
 from charnerf.data.surface import AreaSurface
+from charnerf.data.visibility import spread_order
 from charnerf.errors import DataError
+from charnerf.geometry.cameras import fibonacci_hemisphere
 from charnerf.geometry.hull import hull_contains
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.surfaces.raycast import RayCaster
@@ -18,26 +20,7 @@ from charnerf.types import Hull, SpacePoints
 
 _ROUNDS = 50
 
-
-class AbstractSpace(ABC):
-    """Somewhere to draw labelled points from."""
-
-    @abstractmethod
-    def sample(self, num_points: int, generator: torch.Generator) -> SpacePoints:
-        """Draw points.
-
-        Args:
-            num_points: P, how many.
-            generator: Randomness, on the CPU; the same state gives the same points.
-
-        Returns:
-            Points with B = 1, float32.
-        """
-
-    @property
-    @abstractmethod
-    def size_bytes(self) -> int:
-        """Memory of what is kept to draw from, beside the character's pictures and hull."""
+AbstractSpace = AbstractPoints[SpacePoints]
 
 
 @final
@@ -89,7 +72,7 @@ class SolidSpace(AbstractSpace):
         self._points, self._inside = points, torch.from_numpy(inside)
 
     def sample(self, num_points: int, generator: torch.Generator) -> SpacePoints:
-        """Draw points of the pool; see `AbstractSpace.sample`."""
+        """Draw points of the pool; see `AbstractPoints.sample`."""
         chosen = torch.randint(len(self._points), (num_points,), generator=generator)
         return SpacePoints(self._points[chosen][None], self._inside[chosen].float()[None])
 
@@ -109,7 +92,8 @@ def is_inside(caster: RayCaster, points: np.ndarray, num_directions: int) -> np.
     """
     inside = np.ones(len(points), dtype=bool)
     unsettled = np.arange(len(points))
-    for direction in _sky(num_directions):
+    sky = fibonacci_hemisphere(num_directions)[spread_order(num_directions)]
+    for direction in sky.numpy().astype(np.float32):
         held = caster.occluded(points[unsettled], np.broadcast_to(direction, (len(unsettled), 3)))
         inside[unsettled[~held]] = False
         unsettled = unsettled[held]
@@ -139,13 +123,3 @@ def _near_points(
         kept.append(points[hull_contains(hull[0], points)][:missing])
         missing -= len(kept[-1])
     return torch.cat([*kept, hull_points(hull, missing, generator)])
-
-
-def _sky(number: int) -> np.ndarray:
-    """Unit directions (number, 3) over the upper hemisphere, float32, in an order that soon covers it."""
-    index = np.arange(number) + 0.5
-    height = index / number
-    angle = np.pi * (1.0 + np.sqrt(5.0)) * index
-    across = np.sqrt(1.0 - height * height)
-    sky = np.stack((across * np.cos(angle), across * np.sin(angle), height), axis=-1)
-    return sky[np.argsort(np.arange(number) * 0.618034 % 1.0)].astype(np.float32)

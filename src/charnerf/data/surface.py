@@ -1,6 +1,5 @@
 """Points on the surface of a captured mesh: by area, as the paper draws them, or on what the cameras see."""
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import final
@@ -8,6 +7,7 @@ from typing import final
 import numpy as np
 import torch
 
+from charnerf.data.points import AbstractPoints
 from charnerf.data.visibility import Seen, capture_cameras, default_cameras, see_points
 from charnerf.errors import DataError
 from charnerf.surfaces.color import srgb_from_linear
@@ -18,25 +18,7 @@ from charnerf.types import Cameras, SurfacePoints
 _MAX_ROUNDS = 50
 
 
-class AbstractSurface(ABC):
-    """Somewhere to draw surface points from."""
-
-    @abstractmethod
-    def sample(self, num_points: int, generator: torch.Generator) -> SurfacePoints:
-        """Draw points.
-
-        Args:
-            num_points: P, how many.
-            generator: Randomness, on the CPU; the same state gives the same points.
-
-        Returns:
-            Points with B = 1, float32.
-        """
-
-    @property
-    @abstractmethod
-    def size_bytes(self) -> int:
-        """Memory of what is kept to draw from."""
+AbstractSurface = AbstractPoints[SurfacePoints]
 
 
 @dataclass(frozen=True)
@@ -69,7 +51,7 @@ class AreaSurface(AbstractSurface):
             raise DataError("mesh: found an area of 0 m^2, expected triangles with area; capture it again.")
 
     def sample(self, num_points: int, generator: torch.Generator) -> SurfacePoints:
-        """Draw points by area; see `AbstractSurface.sample`."""
+        """Draw points by area; see `AbstractPoints.sample`."""
         draw = self.draw(num_points, generator)
         points = interpolate(self.mesh.triangles[draw.triangles], draw.u, draw.v)
         return _surface_points(points, srgb_from_linear(draw.rgb))
@@ -123,7 +105,7 @@ class VisibleSurface(AbstractSurface):
         self._pool = _surface_points(points, srgb_from_linear(draw.rgb))
 
     def sample(self, num_points: int, generator: torch.Generator) -> SurfacePoints:
-        """Draw points of the pool, with replacement; see `AbstractSurface.sample`."""
+        """Draw points of the pool, with replacement; see `AbstractPoints.sample`."""
         chosen = torch.randint(self._pool.points.shape[1], (num_points,), generator=generator)
         return self._pool[:, chosen]
 

@@ -38,7 +38,7 @@ def see_points(mesh: SurfaceMesh, points: np.ndarray, triangles: np.ndarray, cam
     normals = triangle_normals(mesh)[triangles]
     visible = np.zeros(len(points), dtype=bool)
     hidden = np.arange(len(points))
-    for index in _spread_order(len(cameras.orthographic)):
+    for index in spread_order(len(cameras.orthographic)):
         if len(hidden) == 0:
             break
         origins, directions, distances = _rays_to(cameras[index], points[hidden])
@@ -79,6 +79,6 @@ def _rays_to(camera: Cameras, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.broadcast_to(pose[:3, 3], points.shape).astype(np.float32), directions, distances
 
 
-def _spread_order(count: int) -> list[int]:
+def spread_order(count: int) -> list[int]:
     """Indices in an order that soon covers all directions, so that few cameras see most points."""
     return sorted(range(count), key=lambda index: (index * 0.618034) % 1.0)
