@@ -16,6 +16,7 @@ from charnerf.drawings.naming import looks_left
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import AZIMUTHS, Viewpoint
 from charnerf.errors import DataError
+from charnerf.pictures import on_white, to_bytes
 
 SIZE = 128  # pixels at which views are compared
 SCALES = 1.1  # of the tallest figure over the shortest, in pictures of one size
@@ -33,7 +34,7 @@ def drawings_in(folder: Path) -> dict[str, Path]:
 
 def drawing_findings(given: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
     """What is wrong with drawings by where they are seen from."""
-    whole: dict[Viewpoint, Path] = {}
+    whole: dict[Viewpoint, tuple[Path, np.ndarray]] = {}
     heights: dict[Path, tuple[float, tuple[int, int]]] = {}
     for view, file in given.items():
         picture, findings = picture_findings(file, (0, 0))
@@ -55,18 +56,18 @@ def drawing_findings(given: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
                 "Cut the figure out.",
             )
             continue
-        whole[view] = file
+        whole[view] = file, cutout.rgba
         heights[file] = (box.height, drawing.size)
         alpha = cutout.rgba[..., 3] > 0.5
         border = np.concatenate((alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]))
         if int(border.sum()) >= CROPPED:
             yield Finding(
                 "cropped figure", str(file), f"{int(border.sum())} pixels of the figure on the picture's border",
-                "all of it, and room around", "Export the picture uncropped.", picture=_rgb(cutout.rgba),
+                "all of it, and room around", "Export the picture uncropped.", picture=to_bytes(on_white(cutout.rgba)),
             )  # fmt: skip
     yield from _scales(heights)
     yield from _sides(whole)
-    yield from _together(whole)
+    yield from _together({view: file for view, (file, _) in whole.items()})
 
 
 def _scales(heights: Mapping[Path, tuple[float, tuple[int, int]]]) -> Iterator[Finding]:
@@ -83,18 +84,17 @@ def _scales(heights: Mapping[Path, tuple[float, tuple[int, int]]]) -> Iterator[F
         )  # fmt: skip
 
 
-def _sides(whole: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
-    """Profiles that look to the other side than their name says."""
-    for view, file in whole.items():
+def _sides(whole: Mapping[Viewpoint, tuple[Path, np.ndarray]]) -> Iterator[Finding]:
+    """Profiles, cut out, that look to the other side than their name says."""
+    for view, (file, rgba) in whole.items():
         if view.name not in ("left", "right"):
             continue
-        rgba = cut_out(load_drawing(file)).rgba
         if looks_left(_square(rgba)) != (view.name == "left"):
             other = "right" if view.name == "left" else "left"
             yield Finding(
                 "mirrored picture", str(file), f"a figure that looks to the picture's {other} by its feet and its face",
                 f"the character's {view.name} side, which looks to the {view.name}", f"Say --side {other}, or flip the picture.",
-                mirror_command(file), _rgb(rgba),
+                mirror_command(file), to_bytes(on_white(rgba)),
             )  # fmt: skip
 
 
@@ -136,7 +136,3 @@ def _square(rgba: np.ndarray) -> np.ndarray:
     top, left = side - rgba.shape[0], (side - rgba.shape[1]) // 2
     square[top:, left : left + rgba.shape[1]] = rgba
     return square
-
-
-def _rgb(rgba: np.ndarray) -> np.ndarray:
-    return (255.0 * (rgba[..., :3] * rgba[..., 3:] + 1.0 - rgba[..., 3:])).round().astype(np.uint8)
