@@ -60,7 +60,7 @@ def draw_character(
     size: int,
     seed: int,
     level: int = 1,
-    azimuths_deg: Mapping[str, float] = SOURCE_AZIMUTHS,
+    azimuths_deg: Mapping[str, float] | None = None,
 ) -> dict[str, np.ndarray]:
     """Draw a character in one style for all views, each view with mistakes of its own.
 
@@ -69,7 +69,7 @@ def draw_character(
         size: Side of the drawings, pixels.
         seed: Of the style and of the hand; another character has another style at the same seed.
         level: Of disagreement, index into LEVELS; at 0 views are captured, with their alpha, and neither inked nor moved.
-        azimuths_deg: From where it is drawn, by the names that the views get; the first rules.
+        azimuths_deg: From where it is drawn, by the names that the views get; the first rules. None: front, side, back.
 
     Returns:
         RGB uint8 (size, size, 3) on paper, RGBA at level 0, by the name of the view.
@@ -84,13 +84,14 @@ def draw_character(
     digest = hashlib.sha256(f"{seed} {character.name}".encode()).digest()
     rng = np.random.default_rng(int.from_bytes(digest[7:15], "little"))
     if character.mesh_file is None:
-        if azimuths_deg is not SOURCE_AZIMUTHS:
+        if azimuths_deg is not None:
             raise DataError(
                 f"{character.folder}: found no mesh to draw {', '.join(azimuths_deg)} of; capture the character again, or take its"
                 " captured views."
             )
         names, images = character.source_names, character.sources.images[0]
     else:
+        azimuths_deg = azimuths_deg or SOURCE_AZIMUTHS
         names = tuple(azimuths_deg)
         surface = load_surface_mesh(character.mesh_file)
         images = captured(surface, tuple(azimuths_deg.values()), size=size, mistakes=mistakes, rng=rng)

@@ -46,19 +46,22 @@ def find_gaps(background: Background, figure: np.ndarray) -> tuple[Gap, ...]:
     height = int(rows[-1] + 1 - rows[0])
     axis, area = 0.5 * (columns[0] + columns[-1]), float(figure.sum())
     paper = label((background.distance <= background.tolerance) & figure, connectivity=1)
-    line = max(1, round(LINE * height))
+    regions = [one for one in regionprops(paper) if one.area >= SMALLEST * area]
+    if not regions:
+        return ()
+    # what has background behind a line's width
+    shallow = ndimage.distance_transform_edt(figure) <= max(1, round(LINE * height)) + 1
     gaps = []
-    for region in regionprops(paper):
+    for region in regions:
         up, left, down, right = region.bbox
-        if region.area < SMALLEST * area:
-            continue
         centre = 0.5 * (up + down) - rows[0]
         if left <= axis < right and centre < MIDDLE * height:
             continue
         mask = paper == region.label
         if float(background.distance[mask].mean()) > PAPERLIKE * background.tolerance:
             continue
-        if _is_closed_by_a_line(mask, figure, line):
+        rim = mask & ~ndimage.binary_erosion(mask)
+        if float(shallow[rim].mean()) > CLOSED:  # a line alone: a sleeve, not the gap beside one
             continue
         gaps.append(
             Gap(mask, (0.5 * (left + right - 1) - axis) / height, centre / height, region.area / height**2)
@@ -79,10 +82,3 @@ def shared(first: Sequence[Gap], second: Sequence[Gap]) -> tuple[list[Gap], list
 def _are_one(one: Gap, other: Gap) -> bool:
     near = np.hypot(one.across + other.across, one.up - other.up) <= APART
     return bool(near) and 1.0 / ALIKE <= one.area / other.area <= ALIKE
-
-
-def _is_closed_by_a_line(mask: np.ndarray, figure: np.ndarray, line: int) -> bool:
-    """Whether background lies behind a line's width along much of a region's rim: a sleeve, not the gap beside one."""
-    rim = mask & ~ndimage.binary_erosion(mask)
-    distance = ndimage.distance_transform_edt(figure)
-    return float((distance[rim] <= line + 1).mean()) > CLOSED

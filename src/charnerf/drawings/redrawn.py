@@ -47,15 +47,11 @@ def redrawn(
         ConfigError: If there is no such level.
         DataError: If a drawing can not be read, or there is no mesh to draw further views of.
     """
-    if views is None:
-        if level == 0:
-            return character
-        front, side, back = draw_character(character, size=SIDE, seed=seed, level=level).values()
-        drawings = turnaround(front, side, back)
-    else:
-        azimuths = {_stored_name(view): view.azimuth_deg for view in views}
-        drawn = draw_character(character, size=SIDE, seed=seed, level=level, azimuths_deg=azimuths)
-        drawings = dict(zip(views, drawn.values(), strict=True))
+    if views is None and level == 0:
+        return character
+    azimuths = None if views is None else {_stored_name(view): view.azimuth_deg for view in views}
+    drawn = draw_character(character, size=SIDE, seed=seed, level=level, azimuths_deg=azimuths).values()
+    drawings = turnaround(*drawn) if views is None else dict(zip(views, drawn, strict=True))
     read = read_views(drawings, size=size, options=options)
     names = tuple(_stored_name(view) for view in drawings)
     return replace(character, sources=read.views, source_names=names)
