@@ -26,7 +26,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
@@ -35,6 +34,7 @@ from charnerf.errors import DataError
 from charnerf.files import write_aside
 from charnerf.geometry.bounds import Bounds
 from charnerf.inference.hero import Hero
+from charnerf.inference.tensor_file import read_tensors
 from charnerf.models.coloring import DrawnColoring
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.heads.blend import BlendHead
@@ -175,19 +175,12 @@ def _cameras(tensors: Mapping[str, Tensor], name: str, pictures: Tensor) -> Came
 
 def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Tensors by name, and what the metadata say."""
-    try:
-        with safe_open(str(file), framework="pt") as opened:
-            metadata = opened.metadata() or {}
-            tensors = {name: opened.get_tensor(name) for name in opened.keys()}
-    except (SafetensorError, OSError) as error:
-        raise DataError(
-            f"{file}: can not be read as safetensors ({error}), expected a baked character."
-        ) from error
-    if metadata.get("format") != FORMAT:
-        raise DataError(
-            f"{file}: found format {metadata.get('format')!r} in its metadata, expected {FORMAT!r}; write one with "
-            "`charnerf reconstruct --bake FILE`."
-        )
+    tensors, metadata = read_tensors(
+        file,
+        file_format=FORMAT,
+        expected="a baked character",
+        otherwise="write one with `charnerf reconstruct --bake FILE`.",
+    )
     read = parse_json(metadata.get("baked", ""), str(file))
     facts = read if isinstance(read, dict) else {}
     numbers = {name: facts.get(name) for name in ("pitch", "tolerance", "radius")}

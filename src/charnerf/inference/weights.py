@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 from omegaconf import DictConfig, OmegaConf
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import save
 from torch import Tensor
 
@@ -17,6 +17,7 @@ from charnerf.files import write_aside, write_text
 from charnerf.inference.build import build_model, build_renderer
 from charnerf.inference.checkpoint_file import read_checkpoint
 from charnerf.inference.model import Model
+from charnerf.inference.tensor_file import read_tensors
 from charnerf.models.charnerf import CharNeRF
 
 RELEASED = Path(__file__).resolve().parents[1] / "weights" / "released.safetensors"
@@ -166,19 +167,12 @@ def _weights_of_run(folder: Path) -> Path:
 
 
 def _read_safetensors(file: Path) -> tuple[DictConfig, dict[str, Tensor]]:
-    try:
-        with safe_open(str(file), framework="pt") as opened:
-            metadata = opened.metadata() or {}
-            state = {name: opened.get_tensor(name) for name in opened.keys()}
-    except (SafetensorError, OSError) as error:
-        raise DataError(
-            f"{file}: can not be read as safetensors ({error}), expected a file that charnerf wrote."
-        ) from error
-    if metadata.get("format") != FORMAT:
-        raise DataError(
-            f"{file}: found format {metadata.get('format')!r} in its metadata, expected {FORMAT!r}; "
-            "it was not written by this version of charnerf."
-        )
+    state, metadata = read_tensors(
+        file,
+        file_format=FORMAT,
+        expected="a file that charnerf wrote",
+        otherwise="it was not written by this version of charnerf.",
+    )
     plain = parse_json(metadata.get("config", ""), str(file))
     return chosen_sections(plain, MODEL_SECTIONS, str(file)), state
 
