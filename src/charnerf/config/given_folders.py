@@ -17,6 +17,7 @@ from yaml import YAMLError
 
 from charnerf.config.bounds import MOST_BYTES, check_yaml
 from charnerf.config.overrides import config_files, parse_overrides
+from charnerf.config.problems import differing
 from charnerf.errors import ConfigError
 
 SEARCH_PATH = "hydra.searchpath"
@@ -98,13 +99,7 @@ def check_hydra(typed: Mapping[str, Any], composed: Mapping[str, Any]) -> None:
     Raises:
         ConfigError: Names a setting that a file makes.
     """
-    keys = [
-        key
-        for key in sorted({*typed, *composed})
-        if typed.get(key) != composed.get(key)
-        and not any(key == free or key.startswith(f"{free}.") for free in FREE)
-    ]
-    if keys:
+    if keys := differing(typed, composed, FREE):
         raise ConfigError(
             f"hydra.{keys[0]}: set by a file of --config-dir, --config-path or {SEARCH_PATH}, expected on the command line"
             f" alone, since Hydra runs what it says ({len(keys)} such settings)."

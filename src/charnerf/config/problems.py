@@ -1,6 +1,7 @@
 """What is wrong with a config, by full key."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 
 
 @dataclasses.dataclass
@@ -44,6 +45,16 @@ class Problems:
 
 def _is_within(key: str, section: str) -> bool:
     return key == section or key.startswith(f"{section}.")
+
+
+def differing(there: Mapping[str, object], here: Mapping[str, object], free: Sequence[str] = ()) -> list[str]:
+    """Full keys whose settings differ, sorted; those are left out that are `free`, or stand in a section that is."""
+    return [
+        key
+        for key in sorted({*there, *here})
+        if there.get(key) != here.get(key)
+        and not any(key == one or key.startswith(f"{one}.") for one in free)
+    ]
 
 
 def join(key: str, name: str | int) -> str:

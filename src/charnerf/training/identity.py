@@ -8,6 +8,7 @@ from typing import Any, final
 import lightning as L
 from omegaconf import DictConfig, OmegaConf
 
+from charnerf.config.problems import differing
 from charnerf.config.schema import LIST_GROUPS
 from charnerf.data.digest import training_digest
 from charnerf.errors import ConfigError
@@ -135,13 +136,7 @@ def flat_settings(node: Any, key: str = "") -> dict[str, Setting]:
 
 
 def _compare(file: Path, there: Mapping[str, Setting], here: Mapping[str, Setting], what: str) -> None:
-    keys = [
-        key
-        for key in sorted({*there, *here})
-        if there.get(key) != here.get(key)
-        and not any(key == free or key.startswith(f"{free}.") for free in MAY_CHANGE)
-    ]
-    if keys:
+    if keys := differing(there, here, MAY_CHANGE):
         lines = [f"  {key}: found {here.get(key)}, expected {there.get(key)}" for key in keys[:MOST_KEYS]]
         more = [f"  and {len(keys) - MOST_KEYS} more"] if len(keys) > MOST_KEYS else []
         raise ConfigError(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, final
 
 from omegaconf import DictConfig
 
+from charnerf.config.problems import differing
 from charnerf.config.search_space import Choice, Interval, SearchSpace
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import write_text
@@ -138,7 +139,7 @@ class Search:
         if there is None:
             self._study.set_user_attr("search", here)
         elif there != here:
-            keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
+            keys = differing(there, here)
             raise ConfigError(
                 f"{self.folder}: holds another search ({json.dumps(keys)} differ), expected this one; name another folder."
             )
