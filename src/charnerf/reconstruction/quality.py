@@ -149,6 +149,7 @@ def suggestions(quality: Quality, options: ReconstructionOptions, *, num_drawing
         lines.append("--smooth 10 evens the surface out.")
     if quality.is_frayed and num_drawings <= FEW_VIEWS:
         lines.append(
-            "--view 45=FILE: one more drawing, from between those given, says most about what is torn."
+            "--view back=FILE, or right=FILE for the other side: where front, sides or back lack one, it says most about what is"
+            " torn."
         )
     return lines
