@@ -7,15 +7,14 @@ from pathlib import Path
 import pytest
 import typer
 
-from charnerf.cli import app as commands
-from charnerf.cli import run
-from charnerf.cli.app import app
+from charnerf.cli import commands, run
+from charnerf.cli.commands import door
 from charnerf.cli.messages import quiet, say
 from charnerf.cli.summary import Summary, close, typed
 from charnerf.errors import DependencyError
 from charnerf.meshing import export
 
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = typer.main.get_command(door).commands
 GENERATE = [
     "generate",
     "--train",

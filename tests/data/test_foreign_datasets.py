@@ -16,7 +16,7 @@ from PIL import EpsImagePlugin, Image
 
 import charnerf
 from charnerf.capture.meshes import load_scene
-from charnerf.cli.app import run
+from charnerf.cli.commands import run
 from charnerf.data.characters import load_character, read_rgba
 from charnerf.data.layout import read_dataset, read_json
 from charnerf.drawings.load import load_drawing

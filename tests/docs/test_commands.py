@@ -16,8 +16,8 @@ import yaml
 from omegaconf import OmegaConf
 from PIL import Image
 
-from charnerf.cli import app as commands
-from charnerf.cli.app import app, run
+from charnerf.cli import commands
+from charnerf.cli.commands import door, run
 from charnerf.config import command_line
 from charnerf.config.composition import compose_config
 from docs.__main__ import pages
@@ -25,7 +25,7 @@ from support import helpers
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*pages(), ROOT / ".github" / "CONTRIBUTING.md"]
-DOOR = typer.main.get_command(app)
+DOOR = typer.main.get_command(door)
 COMMANDS = DOOR.commands  # type: ignore[attr-defined]
 ELSEWHERE = (
     "pip",

@@ -13,7 +13,7 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 import charnerf
-from charnerf.cli.app import run
+from charnerf.cli.commands import run
 from charnerf.config.composition import compose_config
 from charnerf.errors import CharNeRFError, ConfigError, DataError
 from charnerf.inference.build import build_model
@@ -36,7 +36,7 @@ CALLS = (
     {"_target_": "charnerf.files.write_bytes", "path": {"_target_": "pathlib.Path", "_args_": ["OWNED"]}, "content": "x"},
     {"_target_": "lightning.fabric.utilities.cloud_io._load", "path_or_url": "PICKLE", "weights_only": False},
     {"_target_": "lightning.pytorch.core.saving.load_hparams_from_yaml", "config_yaml": "PICKLE"},
-    {"_target_": "charnerf.cli.app.run", "arguments": ["generate", "-o", "OWNED"]},
+    {"_target_": "charnerf.cli.commands.run", "arguments": ["generate", "-o", "OWNED"]},
     {"_target_": "charnerf.inference.weights.Path.touch", "self": "OWNED"},
     {"_target_": "torch.optim.Adam", "params": []},
     {"_target_": "lightning.Trainer"},

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from charnerf.cli.app import run
+from charnerf.cli.commands import run
 from charnerf.reporting.blocks import Bullets, Code, Heading, Picture, Table, Text
 from charnerf.reporting.document import to_markdown
 

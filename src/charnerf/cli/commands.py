@@ -46,7 +46,7 @@ def _epilog(examples: Sequence[str]) -> str:
     return "\b\nExamples:\n" + "".join(f"  {example}\n" for example in examples) + f"\n{DEBUG_NOTE}"
 
 
-app = typer.Typer(
+door = typer.Typer(
     name="charnerf",
     help="Turnaround drawings (front, side, back) to a radiance field, novel views and a mesh.",
     epilog=DEBUG_NOTE,
@@ -54,7 +54,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.command("train", context_settings=train.HYDRA_READS_ALL)(train.command)
+door.command("train", context_settings=train.HYDRA_READS_ALL)(train.command)
 for module in (
     reconstruct,
     finetune,
@@ -72,10 +72,10 @@ for module in (
     search,
     env,
 ):
-    app.command(module.__name__.rpartition(".")[2], epilog=_epilog(module.EXAMPLES))(module.command)
+    door.command(module.__name__.rpartition(".")[2], epilog=_epilog(module.EXAMPLES))(module.command)
 
 
-@app.callback()
+@door.callback()
 def _options(
     debug: Annotated[
         bool, typer.Option("--debug", help="Show the traceback of an error; also after the command.")
@@ -119,7 +119,7 @@ def run(arguments: list[str]) -> int:
         return 0
     try:
         with listening(), quiet() if is_quiet else nullcontext():
-            app(
+            door(
                 arguments, prog_name="charnerf", obj=debug
             )  # leaves by SystemExit, also for wrong options (2)
     except Stopped as stop:
