@@ -13,6 +13,8 @@ from charnerf.cli.messages import quiet, say
 from charnerf.cli.summary import Summary, close, typed
 from charnerf.errors import DependencyError
 from charnerf.meshing import export
+from charnerf.training import search
+from charnerf.training.search import Tried
 
 COMMANDS = typer.main.get_command(door).commands
 GENERATE = [
@@ -84,6 +86,51 @@ def test_json_that_can_not_be_written_is_refused_before_the_work(dataset, tmp_pa
     where = ["--json", str(tmp_path / "file" / "made.json")]
     assert run([*GENERATE, "-o", str(tmp_path / "new"), *where]) == 1
     assert "found a file, expected a folder" in capsys.readouterr().err and not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    "command", [name for name in COMMANDS if name != "train"]
+)  # Hydra reads its arguments
+def test_every_command_gives_programs_json(command):
+    (option,) = [one for one in COMMANDS[command].params if "--json" in one.opts]
+    assert option.default is None and "standard output" in option.help
+
+
+def test_a_doctor_closes_as_others_do(dataset, tmp_path, capsys):
+    examined = ["doctor", str(dataset), "-o", str(tmp_path / "out"), "--jobs", "1"]
+    status = run([*examined, "--json", "-", "--quiet"])
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    assert told.err == "" and found["made"] == f"an examination of {dataset}"
+    assert status == (found["details"]["broken"] > 0)
+    assert found["files"] == [str(tmp_path / "out" / name) for name in ("doctor.html", "doctor.json")]
+
+
+def test_a_packing_closes_as_others_do(dataset, tmp_path, capsys):
+    pytest.importorskip("webdataset")
+    assert (
+        run(["pack", "--data", str(dataset), "-o", str(tmp_path / "shards"), "--json", "-", "--quiet"]) == 0
+    )
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    assert (
+        told.err == "" and found["made"] == "1 character in 1 shard" and found["details"]["characters"] == 1
+    )
+
+
+def test_a_search_closes_as_others_do(tmp_path, monkeypatch, capsys):
+    """Without the trainings."""
+    pytest.importorskip("optuna")
+    found = [Tried({"encoder": "single"}, 0.25, 1.5), Tried({"encoder": "double"}, 0.125, 4.0)]
+    monkeypatch.setattr(search.Search, "run", lambda *_, **__: None)
+    monkeypatch.setattr(search.Search, "front", lambda _: found)
+    space = ["search", "encoder=single,double", "-o", str(tmp_path / "found")]
+    assert run([*space, "--json", "-", "--quiet"]) == 0
+    told = capsys.readouterr()
+    content = json.loads(told.out)
+    assert told.err == "" and content["quality"] == "error 0.2500 in 1.5 s, error 0.1250 in 4 s"
+    assert content["files"] == [str(tmp_path / "found" / "front.csv")]
+    assert [one["seconds"] for one in content["details"]["front"]] == [1.5, 4.0]
 
 
 def test_quiet_lets_warnings_through(capsys):

@@ -1,6 +1,5 @@
 """`charnerf bench`: error against run time."""
 
-import json
 import time
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +9,7 @@ import typer
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Device, SomeDataset, SplitName, Trusted, Weights
-from charnerf.cli.summary import Summary, close
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, show
 
 EXAMPLES = ("charnerf bench --quick", "charnerf bench outputs/run --data characters --json bench.json")
 
@@ -21,9 +20,6 @@ def command(
     quick: Annotated[
         bool, typer.Option("--quick", help="Leave out the sweep of samples and tolerances.")
     ] = False,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", dir_okay=False, help="Write all numbers there.")
-    ] = None,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For the sweep's diagram.")
     ] = Path("outputs/bench"),
@@ -31,16 +27,17 @@ def command(
     split: SplitName = "test",
     device: Device = "auto",
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Measure error against run time: speed-ups over a pixelNeRF-like evaluation, and what they cost."""
     from charnerf.bench.run import run, summary
-    from charnerf.files import write_text
+    from charnerf.files import check_folder
 
     began = time.perf_counter()
+    check_json(json_file)
+    check_folder(output)
     model = load_model(weights, device=device, trust=trust)
     result = run(model, data=data, split=split, quick=quick, output=output, say=say)
-    if json_file is not None:
-        write_text(json_file, json.dumps(result, indent=2) + "\n")
-    typer.echo(summary(result))
-    files = [*([] if quick else [output]), *([] if json_file is None else [json_file])]
-    close(Summary(made="error against run time", files=files, began=began), None)
+    show(summary(result), json_file)
+    files = () if quick else (output,)
+    close(Summary(made="error against run time", files=files, began=began, facts=result), json_file)

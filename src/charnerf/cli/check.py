@@ -8,7 +8,7 @@ import typer
 
 from charnerf.cli.model import load_model, pick_device
 from charnerf.cli.options import Device, SomeCharacter, SomeDataset, Trusted
-from charnerf.cli.summary import JsonFile, Summary, check_json, close
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, show
 from charnerf.errors import DataError
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def command(
     output.mkdir(parents=True, exist_ok=True)
     result.to_json(output / "check.json")
     result.plot(output / "check.png")
-    typer.echo(result.table())
+    show(result.table(), json_file)
     files = (output / "check.json", output / "check.png")
     told = "passed" if result.passed else "BROKEN"
     facts = {"passed": result.passed}

@@ -1,16 +1,17 @@
 """`charnerf doctor`: what is wrong with a data set, drawings or a run."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from charnerf.cli.messages import say
 from charnerf.cli.options import Jobs, Trusted
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, show
 from charnerf.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from charnerf.doctor.finding import Finding
     from charnerf.drawings.viewpoints import Viewpoint
@@ -44,28 +45,48 @@ def command(
     ] = Path("outputs/doctor"),
     jobs: Jobs = None,
     trust: Trusted = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Find what is wrong with a data set, drawings or a run; each fault with its evidence, the fix and a command.
 
     Silhouettes are carved into a hull and seen again by every camera, and so is the mesh. Exit status 1 if
     anything is broken.
     """
-    from charnerf.doctor.report import verdict, write_findings
+    from charnerf.doctor.report import NUMBERS, verdict, write_findings
     from charnerf.files import check_folder
 
+    began = time.perf_counter()
+    check_json(json_file)
     check_folder(output)
     findings = list(_findings(subject, jobs, tuple(trust or ())))
     page = write_findings(output, " ".join(map(str, subject)), findings)
-    for one in findings[:SHOWN]:
-        typer.echo(one.line())
-        if one.command:
-            typer.echo(f"    {one.command}")
-    if len(findings) > SHOWN:
-        typer.echo(f"... and {len(findings) - SHOWN} more.")
-    typer.echo(verdict(findings))
-    say(str(page))
-    if any(one.is_broken for one in findings):
+    show("\n".join(_lines(findings)), json_file)
+    broken = sum(one.is_broken for one in findings)
+    close(
+        Summary(
+            made=f"an examination of {' '.join(map(str, subject))}",
+            files=(page, output / NUMBERS),
+            began=began,
+            quality=verdict(findings),
+            facts={"broken": broken, "notes": len(findings) - broken},
+        ),
+        json_file,
+    )
+    if broken:
         raise typer.Exit(BROKEN)
+
+
+def _lines(findings: "Sequence[Finding]") -> "Iterator[str]":
+    """The first findings, how many there are more, and the verdict."""
+    from charnerf.doctor.report import verdict
+
+    for one in findings[:SHOWN]:
+        yield one.line()
+        if one.command:
+            yield f"    {one.command}"
+    if len(findings) > SHOWN:
+        yield f"... and {len(findings) - SHOWN} more."
+    yield verdict(findings)
 
 
 def _findings(subject: list[Path], jobs: int | None, trusted: tuple[str, ...]) -> "Iterator[Finding]":

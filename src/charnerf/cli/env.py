@@ -1,8 +1,6 @@
 """`charnerf env`: what a bug report needs to know of the machine."""
 
-import typer
-
-from charnerf.cli.summary import STDOUT, JsonFile, check_json, write_json
+from charnerf.cli.summary import JsonFile, check_json, show, write_json
 
 EXAMPLES = ("charnerf env", "charnerf env --json env.json")
 EXTRAS = ("plotly", "usd-core", "transformers", "gradio", "bpy")
@@ -14,9 +12,8 @@ def command(*, json_file: JsonFile = None) -> None:
     check_json(json_file)
     facts = _facts()
     width = max(map(len, facts))
-    if json_file != STDOUT:
-        for name, value in facts.items():
-            typer.echo(f"{name:<{width}}  {'-' if value is None else value}")
+    lines = [f"{name:<{width}}  {'-' if value is None else value}" for name, value in facts.items()]
+    show("\n".join(lines), json_file)
     write_json(facts, json_file)
 
 

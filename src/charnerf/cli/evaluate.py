@@ -13,7 +13,7 @@ from charnerf.cli.dataset import GivenDataset, dataset_options
 from charnerf.cli.drawings import reading_options
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Device, SplitName, Trusted, Weights, gathered, is_count
-from charnerf.cli.summary import Summary, close
+from charnerf.cli.summary import STDOUT, Summary, check_json, close
 from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import check_folder
@@ -37,7 +37,12 @@ NumViews = Annotated[
 ]
 JsonFile = Annotated[
     Path | None,
-    typer.Option("--json", metavar="FILE", dir_okay=False, help="Write the metrics there as well."),
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        dir_okay=False,
+        help="Write the metrics there as well; - is standard output, where they go anyhow.",
+    ),
 ]
 Kept = Annotated[
     Path | None,
@@ -144,9 +149,9 @@ def _check(output: Path | None, json_file: Path | None, resolution: int | None) 
     """Check, before any work, that meshes can be made and what is measured can be written."""
     if resolution is not None:
         MeshOptions(resolution=resolution)
-    for folder in (output, json_file.parent if json_file else None):
-        if folder is not None:
-            check_folder(folder)
+    if output is not None:
+        check_folder(output)
+    check_json(json_file)
 
 
 def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None, began: float) -> None:
@@ -158,7 +163,7 @@ def _write(metrics: dict[str, Any], output: Path | None, json_file: Path | None,
     if output is not None:
         write_metrics(output / "metrics.json", metrics)
         files += [write_run_report(output).with_suffix(".html"), output / "metrics.json"]
-    if json_file is not None:
+    if json_file is not None and json_file != STDOUT:  # which gets them anyhow
         write_metrics(json_file, metrics)
         files.append(json_file)
     made = f"figures of {counted(metrics['num_characters'], 'character')}"

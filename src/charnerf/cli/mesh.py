@@ -23,7 +23,7 @@ from charnerf.cli.options import (
     is_count,
     mesh_options,
 )
-from charnerf.cli.summary import JsonFile, Summary, check_json, close
+from charnerf.cli.summary import JsonFile, Summary, check_json, close, show
 from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.reconstruction.options import LIGHT
@@ -158,11 +158,11 @@ def command(
     options = _options(mesh, plan, texture, suffix)
     heroes = _heroes(data.opened(), character, split, symmetric, weights, device=device, trust=trust)
     if split is not None:
-        _measure(heroes, options, output, split)
+        show(_measure(heroes, options, output, split).rstrip("\n"), json_file)
     written: list[Path] = []
     for one, hero in heroes:
         folder = output if split is None else output / one.name
-        files = _write(hero, one.name, folder, options, plan, suffix)
+        files = _write(hero, one.name, folder, options, plan, suffix, json_file)
         notes = files.notes + (_converged(hero, one.name, folder, files) if convergence else ())
         for line in notes if split is None else notes[:1]:
             say(line)
@@ -187,9 +187,15 @@ def _options(mesh: MeshOptions, plan: Plan, texture: Texture | None, suffix: str
 
 
 def _write(
-    hero: "Hero", name: str, folder: Path, options: MeshOptions, plan: Plan, suffix: str
+    hero: "Hero",
+    name: str,
+    folder: Path,
+    options: MeshOptions,
+    plan: Plan,
+    suffix: str,
+    json_file: Path | None,
 ) -> "MeshFiles":
-    """Write a mesh, or levels of detail with their table, which is printed."""
+    """Write a mesh, or levels of detail with their table, which is shown."""
     from charnerf.meshing.lod import lod_table
     from charnerf.reconstruction.meshes import write_lods, write_mesh
 
@@ -197,7 +203,7 @@ def _write(
         return write_mesh(hero, name, folder, options, suffix=suffix)
     grids = plan.grids or (options.resolution,)
     files = write_lods(hero, name, folder, options, resolutions=grids, faces=plan.counts, suffix=suffix)
-    typer.echo(lod_table(files.lods))
+    show(lod_table(files.lods), json_file)
     return files
 
 
@@ -246,8 +252,8 @@ def _numbers(text: str | None, name: str, *, least: int) -> tuple[int, ...]:
 
 def _measure(
     heroes: Sequence[tuple["Character", "Hero"]], options: MeshOptions, output: Path, split: str
-) -> None:
-    """Write and print OUTPUT/meshes.md, with meshes.json: what meshes and each kind of colors are worth."""
+) -> str:
+    """Write OUTPUT/meshes.md, which is returned, with meshes.json: what meshes and each kind of colors are worth."""
     from charnerf.evaluation.environment import environment
     from charnerf.evaluation.mesh_scores import score_meshes, score_text
     from charnerf.evaluation.timing import process_peak_mib
@@ -269,4 +275,4 @@ def _measure(
     text = score_text(rows, facts)
     write_text(output / "meshes.md", text)
     write_text(output / "meshes.json", json.dumps({"facts": facts, "characters": rows}, indent=2) + "\n")
-    typer.echo(text, nl=False)
+    return text

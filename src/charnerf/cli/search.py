@@ -1,14 +1,20 @@
 """`charnerf search`: which configs give the least error for their seconds."""
 
+import time
 from functools import partial
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from charnerf.cli.messages import say
 from charnerf.cli.options import Folder
+from charnerf.cli.summary import JsonFile, Summary, check_json, close
 from charnerf.cli.train import begin_process
+from charnerf.wording import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from charnerf.training.search import Tried
 
 Overrides = Annotated[
     list[str],
@@ -32,6 +38,7 @@ def command(
         Literal["render_per_frame", "encode", "mesh", "train"], typer.Option(help="Which seconds count.")
     ] = "render_per_frame",
     seed: Annotated[int, typer.Option(min=0, help="What is chosen follows from it.")] = 0,
+    json_file: JsonFile = None,
 ) -> None:
     """Train configs that Optuna chooses for the least error and seconds; DIR/front.csv has those that no other beats in both.
 
@@ -46,6 +53,8 @@ def command(
     from charnerf.training.run import run_training
     from charnerf.training.search import Search
 
+    began = time.perf_counter()
+    check_json(json_file)
     space = search_space(overrides, conf_folder())
     for probe in space.probes():
         check_command_line(probe, conf=conf_folder())
@@ -54,6 +63,23 @@ def command(
     search = Search(output, space, seconds=seconds, seed=seed)
     since = begin_grid(output)
     search.run(trials, compose_config, train=partial(run_training, begin_process=begin_process))
-    report: Path | None = report_grid(output)
-    say(f"front: {search.write_front()}{f'; report: {report}' if report else ''}")
+    report, front = report_grid(output), search.front()
+    close(
+        Summary(
+            made=f"a front of {counted(len(front), 'config')}",
+            files=(*([report.with_suffix(".html")] if report else []), search.write_front()),
+            began=began,
+            quality=_quality(front),
+            facts={
+                "front": [{"chosen": one.chosen, "error": one.error, "seconds": one.seconds} for one in front]
+            },
+        ),
+        json_file,
+    )
     check_grid(output, since=since)
+
+
+def _quality(front: "Sequence[Tried]") -> str:
+    """The ends of a front, fastest first; "" of none."""
+    ends = [front[0], front[-1]] if len(front) > 1 else front
+    return ", ".join(f"error {one.error:.4f} in {one.seconds:.3g} s" for one in ends)

@@ -77,6 +77,12 @@ def close(summary: Summary, json_file: Path | None) -> None:
     write_json(content, json_file)
 
 
+def show(text: str, json_file: Path | None) -> None:
+    """Print a result where the JSON does not go."""
+    if json_file != STDOUT:
+        typer.echo(text)
+
+
 def write_json(content: Mapping[str, Any], json_file: Path | None) -> None:
     """Write content where it is asked for, if it is."""
     from charnerf.files import write_text
