@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from charnerf.cli.drawings import GivenDrawings, given_drawings
+from charnerf.cli.drawings import GivenDrawings, given_drawings, reading_options
 from charnerf.drawings.viewpoints import viewpoint
 from charnerf.errors import ConfigError, DataError
 from support.painted import on_background, paint
@@ -80,3 +80,10 @@ def test_wrong_names_and_numbers_of_a_sheet(sheet, files):
         given([files[0]])
     with pytest.raises(ConfigError, match="found 4 files, expected FRONT SIDE BACK"):
         given([*files, files[0]])
+
+
+def test_a_wrong_segmenter_is_refused_before_any_work():
+    assert reading_options().segment is None
+    for wrong in ("net", "paper:u2net", ""):
+        with pytest.raises(ConfigError, match="--segmenter: found .* expected paper, rembg or rembg:MODEL"):
+            reading_options(segmenter=wrong)

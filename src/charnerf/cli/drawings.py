@@ -67,10 +67,29 @@ KeepInk = Annotated[
     ),
 ]
 
+Segmenter = Annotated[
+    str,
+    typer.Option(
+        metavar="paper|rembg[:MODEL]",
+        help="What tells figures without alpha from their background: its plain colour, or a network whose file is on this machine"
+        " (extra rembg), for photographs and painted scenes.",
+    ),
+]
 
-def reading_options(*, as_drawn: AsDrawn = False, keep_ink: KeepInk = False) -> ReadingOptions:
+
+def reading_options(
+    *, as_drawn: AsDrawn = False, keep_ink: KeepInk = False, segmenter: Segmenter = "paper"
+) -> ReadingOptions:
     """How drawings are read."""
-    return ReadingOptions(reconciled=not as_drawn, keep_ink=keep_ink)
+    name, _, model = segmenter.partition(":")
+    if name not in ("paper", "rembg") or (name == "paper" and model):
+        raise ConfigError(f"--segmenter: found '{segmenter[:60]}', expected paper, rembg or rembg:MODEL.")
+    segment = None
+    if name == "rembg":
+        from charnerf.drawings.network_mask import NetworkMask
+
+        segment = NetworkMask(model) if model else NetworkMask()
+    return ReadingOptions(reconciled=not as_drawn, keep_ink=keep_ink, segment=segment)
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ def find_background(drawing: Drawing) -> Background:
             raise DataError(
                 f"{drawing.name}: found a border of which only {100 * plain:.0f} % is of one colour, expected a "
                 "plain background or "
-                "alpha. Paint the background in one colour, or save the figure with a transparent one."
+                "alpha. Paint the background in one colour, save the figure with a transparent one, or take --segmenter rembg."
             )
         paper = _fit_background(lab, ring, inlier)
         distance = np.linalg.norm(lab - paper, axis=-1)

@@ -13,6 +13,7 @@ from skimage.measure import label
 from charnerf.drawings.background import Background, find_background
 from charnerf.drawings.enclosed import Gap, find_gaps
 from charnerf.drawings.load import Drawing
+from charnerf.drawings.options import Segment
 from charnerf.drawings.surroundings import (
     count_figures,
     cropped,
@@ -47,13 +48,17 @@ class Cutout:
     gaps: tuple[Gap, ...] = ()
 
 
-def cut_out(drawing: Drawing) -> Cutout:
+def cut_out(drawing: Drawing, segment: Segment | None = None) -> Cutout:
     """Separate the figure from its background.
 
     Alpha is used where it carries information. Otherwise the background's colour is read off the border (with
     a slow gradient, as paper has), everything of that colour that is connected to the border goes, and the
     outline gets soft alpha. A frame around the picture and a shadow on the ground go too. Regions of background
     colour that the figure encloses stay, and are listed: whether they are gaps, another view tells (`see_through`).
+
+    Args:
+        drawing: One figure.
+        segment: Tells the figure of a drawing without alpha from what lies behind it; None: the background's colour does.
 
     Raises:
         DataError: If the border is not plain, no figure remains, or several of one size do.
@@ -67,9 +72,13 @@ def cut_out(drawing: Drawing) -> Cutout:
             notes.append(SHADOW_NOTE)
             rgba[..., 3] *= ~shadow
         rgba[..., 3] *= _without_specks(rgba[..., 3] > 0.5, notes, margin=2)
-    else:
+    elif segment is None:
         drawn, mask, gaps, notes = _by_background(drawing)
         rgba = _soft_outline(drawn, mask)
+    else:
+        notes = ["cut out by a network"]
+        mask = _without_specks(segment(drawing) > 0.5, notes, margin=0)
+        rgba = _soft_outline(on_white(drawing.rgba), mask)
     figure = rgba[..., 3] > 0.5
     count = count_figures(figure)
     if count > 1:

@@ -13,7 +13,7 @@ from charnerf.drawings.cutout import Cutout, cut_out, see_through
 from charnerf.drawings.enclosed import shared
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
-from charnerf.drawings.options import ReadingOptions
+from charnerf.drawings.options import ReadingOptions, Segment
 from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.picture import draw_assumptions
 from charnerf.drawings.viewpoints import Viewpoint, between_square_ones
@@ -83,8 +83,8 @@ def read_views(
     if size < 16:
         raise DataError(f"size: found {size}, expected at least 16 pixels.")
     _check_viewpoints(drawings)
-    figures = _without_gaps([_prepare(viewpoint, source) for viewpoint, source in drawings.items()])
     options = options or ReadingOptions()
+    figures = _without_gaps([_prepare(view, source, options.segment) for view, source in drawings.items()])
     figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
     given = _canvases(figures, extent, size)
@@ -166,13 +166,13 @@ def _source_views(
     )
 
 
-def _prepare(viewpoint: Viewpoint, source: Picture) -> _Figure:
+def _prepare(viewpoint: Viewpoint, source: Picture, segment: Segment | None) -> _Figure:
     """Read and cut out one drawing."""
     if isinstance(source, np.ndarray):
         drawing = drawing_from_array(source, f"the {viewpoint.name} drawing")
     else:
         drawing = load_drawing(source)
-    cutout = cut_out(drawing)
+    cutout = cut_out(drawing, segment)
     return _Figure(viewpoint, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
 
 
