@@ -85,5 +85,5 @@ def test_wrong_names_and_numbers_of_a_sheet(sheet, files):
 def test_a_wrong_segmenter_is_refused_before_any_work():
     assert reading_options().segment is None
     for wrong in ("net", "paper:u2net", ""):
-        with pytest.raises(ConfigError, match="--segmenter: found .* expected paper, rembg or rembg:MODEL"):
+        with pytest.raises(ConfigError, match=r"--segmenter: found .* expected paper, rembg or rembg:MODEL"):
             reading_options(segmenter=wrong)
