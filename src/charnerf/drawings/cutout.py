@@ -63,42 +63,21 @@ def cut_out(drawing: Drawing, segment: Segment | None = None) -> Cutout:
     Raises:
         DataError: If the border is not plain, no figure remains, or several of one size do.
     """
-    gaps: tuple[Gap, ...] = ()
-    drawn = None
     if has_alpha(drawing.rgba[..., 3]):
-        rgba, notes = drawing.rgba.copy(), ["cut out by its alpha"]
-        shadow = shadow_by_alpha(rgba)
-        if shadow.any():
-            notes.append(SHADOW_NOTE)
-            rgba[..., 3] *= ~shadow
-        rgba[..., 3] *= _without_specks(rgba[..., 3] > 0.5, notes, margin=2)
+        cutout = _by_alpha(drawing)
     elif segment is None:
-        drawn, mask, gaps, notes = _by_background(drawing)
-        rgba = _soft_outline(drawn, mask)
+        cutout = _by_background(drawing)
     else:
         notes = ["cut out by a network"]
         mask = _without_specks(segment(drawing) > 0.5, notes, margin=0)
-        rgba = _soft_outline(on_white(drawing.rgba), mask)
-    figure = rgba[..., 3] > 0.5
-    count = count_figures(figure)
-    if count > 1:
-        raise DataError(
-            f"{drawing.name}: found {count} figures side by side, expected one: it looks like a sheet. Give it alone, as"
-            " `charnerf reconstruct SHEET -o DIR`, or crop it to one figure."
-        )
-    share = float(figure.mean())
-    if share < 0.002:
-        raise DataError(
-            f"{drawing.name}: found a figure of {100 * share:.2f} % of the picture, expected one that fills "
-            "a good part of it. "
-            "Its colours may be too near to the background's: save it with a transparent background."
-        )
+        cutout = Cutout(_soft_outline(on_white(drawing.rgba), mask), tuple(notes))
+    figure = cutout.rgba[..., 3] > 0.5
+    _check_figure(figure, drawing.name)
     touched = [name for name, line in _borders(figure).items() if line.any()]
-    if touched and not has_alpha(drawing.rgba[..., 3]):
-        notes.append(
-            f"the figure touches the picture's {', '.join(touched)} edge: if it is cropped, draw it whole"
-        )
-    return Cutout(rgba, tuple(notes), drawn, gaps)
+    if not touched or has_alpha(drawing.rgba[..., 3]):
+        return cutout
+    note = f"the figure touches the picture's {', '.join(touched)} edge: if it is cropped, draw it whole"
+    return replace(cutout, notes=(*cutout.notes, note))
 
 
 def see_through(cutout: Cutout, gaps: Sequence[Gap]) -> Cutout:
@@ -117,8 +96,35 @@ def has_alpha(alpha: np.ndarray) -> bool:
     return ALPHA_SHARE < clear < 1.0 - 1e-4
 
 
-def _by_background(drawing: Drawing) -> tuple[np.ndarray, np.ndarray, tuple[Gap, ...], list[str]]:
-    """The drawing on white (H, W, 3), what of it is figure by the background that its border shows, gaps in it, and notes."""
+def _check_figure(figure: np.ndarray, name: str) -> None:
+    """Refuse what is no single figure (H, W) bool."""
+    count = count_figures(figure)
+    if count > 1:
+        raise DataError(
+            f"{name}: found {count} figures side by side, expected one: it looks like a sheet. Give it alone, as"
+            " `charnerf reconstruct SHEET -o DIR`, or crop it to one figure."
+        )
+    share = float(figure.mean())
+    if share < 0.002:
+        raise DataError(
+            f"{name}: found a figure of {100 * share:.2f} % of the picture, expected one that fills a good part of it. Its"
+            " colours may be too near to the background's: save it with a transparent background."
+        )
+
+
+def _by_alpha(drawing: Drawing) -> Cutout:
+    """The figure as the drawing's alpha says, without its shadow."""
+    rgba, notes = drawing.rgba.copy(), ["cut out by its alpha"]
+    shadow = shadow_by_alpha(rgba)
+    if shadow.any():
+        notes.append(SHADOW_NOTE)
+        rgba[..., 3] *= ~shadow
+    rgba[..., 3] *= _without_specks(rgba[..., 3] > 0.5, notes, margin=2)
+    return Cutout(rgba, tuple(notes))
+
+
+def _by_background(drawing: Drawing) -> Cutout:
+    """The figure by the background that the drawing's border shows, and gaps in it."""
     notes: list[str] = []
     background = find_background(drawing)
     figure = ~background.mask
@@ -146,7 +152,8 @@ def _by_background(drawing: Drawing) -> tuple[np.ndarray, np.ndarray, tuple[Gap,
         notes.append(SHADOW_NOTE)
         figure &= ~(shadow | _fenced_in(background, figure, shadow))
     figure = _without_specks(figure, notes, margin=0)
-    return on_white(drawing.rgba), figure, find_gaps(background, figure), notes
+    drawn = on_white(drawing.rgba)
+    return Cutout(_soft_outline(drawn, figure), tuple(notes), drawn, find_gaps(background, figure))
 
 
 def _fenced_in(background: Background, figure: np.ndarray, shadow: np.ndarray) -> np.ndarray:
