@@ -19,7 +19,7 @@ from pathlib import Path
 import torch
 
 from charnerf.capture.character import CaptureOptions, capture_character
-from charnerf.capture.procedural_data import character_seed, generate_dataset
+from charnerf.capture.generated import character_seed, generate_dataset
 from charnerf.config.composition import compose_config
 from charnerf.data.layout import read_dataset
 from charnerf.data.mixed import MixedDataset

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from charnerf.capture.procedural_data import generate_dataset
+from charnerf.capture.generated import generate_dataset
 
 pytestmark = pytest.mark.slow
 

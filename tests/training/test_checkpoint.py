@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from charnerf.capture.procedural_data import generate_dataset
+from charnerf.capture.generated import generate_dataset
 from charnerf.cli.train import main as train
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import named_full_disk

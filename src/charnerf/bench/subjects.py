@@ -14,7 +14,7 @@ from torch import Tensor
 
 from charnerf.bench.baseline import PixelAligned
 from charnerf.capture.character import CaptureOptions, capture_character
-from charnerf.capture.procedural_data import character_seed
+from charnerf.capture.generated import character_seed
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.geometry.cameras import pixel_centres, pixel_rays

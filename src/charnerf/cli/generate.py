@@ -1,4 +1,4 @@
-"""`charnerf generate`: the embedded characters as a data set."""
+"""`charnerf generate`: generated characters as a data set."""
 
 import time
 from typing import Annotated
@@ -13,8 +13,13 @@ from charnerf.wording import counted
 EXAMPLES = (
     "charnerf generate -o embedded --train 32 --val 4 --test 6",
     "charnerf generate -o few --train 2 --val 1 --test 1",
+    "charnerf generate --shapes -o shapes --train 1000 --val 4 --test 4",
 )
 MOST = 1_000_000  # characters of a split
+
+Shapes = Annotated[
+    bool, typer.Option("--shapes", help="Shapes without meaning instead, as data=shapes trains on.")
+]
 
 
 def command(
@@ -24,13 +29,18 @@ def command(
     val: Annotated[int, typer.Option(min=0, max=MOST, help="Characters of the val split.")] = 4,
     test: Annotated[int, typer.Option(min=0, max=MOST, help="Characters of the test split.")] = 6,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same characters.")] = 0,
+    shapes: Shapes = False,
     views: Views = 48,
     size: Size = 128,
     jobs: Jobs = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Write the embedded characters of `data=procedural` as a data set."""
-    from charnerf.capture.procedural_data import generate_dataset
+    """Write generated characters as a data set: the embedded ones of `data=procedural`, unless others are asked for.
+
+    Each hangs on the seed, its split and its number alone; the same command goes on with one that was interrupted.
+    """
+    from charnerf.capture.generated import EMBEDDED, generate_dataset
+    from charnerf.capture.shapes_data import shapes_generator
     from charnerf.data.digest import split_digest
     from charnerf.data.layout import read_dataset
     from charnerf.files import check_folder
@@ -40,11 +50,14 @@ def command(
     began = time.perf_counter()
     check_json(json_file)
     check_folder(output)
-    generate_dataset(output, train, val, test, seed, views=views, size=size, processes=jobs)
+    generator = shapes_generator() if shapes else EMBEDDED
+    generate_dataset(
+        output, train, val, test, seed, generator=generator, views=views, size=size, processes=jobs
+    )
     splits = read_dataset(output).splits
     close(
         Summary(
-            made=f"{counted(train + val + test, 'embedded character')}",
+            made=counted(train + val + test, "shape" if shapes else "embedded character"),
             files=(output,),
             began=began,
             next_=(typed("train", "data=folder", f"data.root={output}"),) if train and val and test else (),

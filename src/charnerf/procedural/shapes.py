@@ -217,8 +217,8 @@ def lathe(
     )
 
 
-def sheet(grid: ArrayLike, thickness: float) -> Shape:
-    """A surface given by points (m, n, 3), thickened; row 0 is v = 0, column 0 is u = 0.
+def sheet(grid: ArrayLike, thickness: ArrayLike) -> Shape:
+    """A surface given by points (m, n, 3), thickened by one or (m, n, 1) values; row 0 is v = 0, column 0 is u = 0.
 
     Seen from the side that its columns run to the right and its rows upwards, it is the front.
     """
@@ -226,7 +226,8 @@ def sheet(grid: ArrayLike, thickness: float) -> Shape:
     rows, columns = points.shape[:2]
     normal = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
-    outer, inner = points + 0.5 * thickness * normal, points - 0.5 * thickness * normal
+    half = 0.5 * np.asarray(thickness, dtype=np.float64) * normal
+    outer, inner = points + half, points - half
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
     face = np.concatenate((np.stack((a, b, c), axis=-1), np.stack((a, c, d), axis=-1)))
