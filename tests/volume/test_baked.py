@@ -13,6 +13,7 @@ from charnerf.scene import FunctionField, Scene
 from charnerf.types import FieldOutput, RayBundle, Rendering
 from charnerf.volume.baking.bake import bake
 from charnerf.volume.baking.field import BakedField
+from charnerf.volume.baking.march import Seen
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.baked import BakedRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -166,6 +167,15 @@ def test_what_can_not_be_baked_is_rendered_as_culled(caplog):
     prepared = baked().prepared(scene)
     assert baked().prepared(prepared) is prepared
     assert baked().render(prepared, rays).estimate is None  # gradients are kept here: as in training
+
+
+def test_of_distrusted_rays_only_what_matters_is_asked():
+    """Ray 0 has one large error and two small ones, ray 1 two that are allowed together, ray 2 none."""
+    allowed = (0.4 * 0.05) ** 2
+    squares = allowed * torch.tensor((2.0, 0.3, 0.3, 0.45, 0.45))
+    nothing, ray = torch.zeros(3), torch.tensor((0, 0, 0, 1, 1))
+    seen = Seen(ray, torch.ones(5), torch.ones(5), nothing, nothing, nothing, 5)
+    assert baked()._distrusted(seen, squares).tolist() == [0]
 
 
 def test_a_grid_that_does_not_fit_is_coarser_and_says_so(caplog):

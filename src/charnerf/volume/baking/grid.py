@@ -103,14 +103,15 @@ def interpolated(index: Tensor, rows: Tensor, at: Tensor) -> Tensor:
     _, size_y, size_z = index.shape
     last = at.new_tensor(index.shape) - 2.0
     low = torch.minimum(at.floor().clamp_min_(0.0), last)
-    share = at - low
     x, y, z = low.int().unbind(-1)
     corner = (x * size_y + y) * size_z + z
     steps = [(a * size_y + b) * size_z + c for a in (0, 1) for b in (0, 1) for c in (0, 1)]
-    sides = torch.stack((1.0 - share, share), dim=-1)  # (P, 3, 2)
-    weights = sides[:, 0, :, None, None] * sides[:, 1, None, :, None] * sides[:, 2, None, None, :]
-    chosen = index.reshape(-1)[corner[:, None] + torch.tensor(steps, dtype=corner.dtype, device=at.device)]
-    return F.embedding_bag(chosen, rows, per_sample_weights=weights.reshape(-1, 8), mode="sum")
+    around = corner[:, None] + torch.tensor(steps, dtype=corner.dtype, device=at.device)
+    chosen = index.reshape(-1).index_select(0, around.reshape(-1)).view(-1, len(steps))
+    share = (at - low).t().contiguous()  # places in a row: products of pairs side by side would be slow
+    near_x, near_y, near_z = torch.stack((1.0 - share, share), dim=1)  # (2, P) each
+    weights = (near_x[:, None, None] * (near_y[:, None] * near_z)).reshape(len(steps), -1).t().contiguous()
+    return F.embedding_bag(chosen, rows, per_sample_weights=weights, mode="sum")
 
 
 def combined(coefficients: Tensor, polynomials: Tensor) -> Tensor:

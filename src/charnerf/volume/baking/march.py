@@ -3,7 +3,7 @@
 Letters: R rays, r those under way, S samples at once, P groups of samples that count.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -47,7 +47,7 @@ class Seen:
 class _UnderWay(TensorRecord):
     """Rays (r,) under way: their numbers, where they began and go, in cells of the lattice, where they are and end, m."""
 
-    rows: Tensor
+    numbers: Tensor
     origins: Tensor
     directions: Tensor
     t_vals: Tensor
@@ -68,62 +68,60 @@ def march(grid: BakedGrid, rays: RayBundle, *, unseen: float) -> Seen:
     """
     near, far = box_interval(rays, grid.low, grid.high)
     light, errors, spacing = torch.ones_like(near), torch.zeros_like(near), SPACING * grid.step
-    rows = (far > near).nonzero()[:, 0]
+    numbers = (far > near).nonzero()[:, 0]
     way = _UnderWay(
-        rows,
-        (rays.origins[rows] - grid.origin) / grid.pitch,
-        rays.directions[rows] / grid.pitch,
-        near[rows],
-        far[rows],
+        numbers,
+        (rays.origins[numbers] - grid.origin) / grid.pitch,
+        rays.directions[numbers] / grid.pitch,
+        near[numbers],
+        far[numbers],
     )
     offsets = (torch.arange(AT_ONCE, dtype=near.dtype, device=near.device) + 0.5) * spacing
-    groups: list[tuple[Tensor, Tensor, Tensor]] = [(rows[:0], near[:0], near[:0])]
+    groups: list[tuple[Tensor, Tensor, Tensor]] = [(numbers[:0], near[:0], near[:0])]
     num_samples = 0
-    while len(way.rows):
-        gap = _gaps_at(grid, way)
-        t_vals = way.t_vals + _free_way(way, gap)
-        holding = (gap == 0.0).nonzero()[:, 0]
+    while len(way.numbers):
+        gap, free = _free_way(grid, way)
+        t_vals = way.t_vals + free
+        holding = (gap == 0).nonzero()[:, 0]
         if len(holding):
-            here = way[holding]
+            here = way.rows(holding)
             samples = here.t_vals[:, None] + offsets
             lengths = (here.ends[:, None] - samples + 0.5 * spacing).clamp(0.0, spacing)
             depths, off = _read(grid, here.at(samples), lengths)
-            after = light[here.rows, None] * torch.exp(-depths.cumsum(-1))
-            weights = torch.cat((light[here.rows, None], after[:, :-1]), dim=-1) - after
-            light[here.rows] = after[:, -1]
-            errors[here.rows] += (after * off).square().sum(-1)
-            groups.append(_group(here.rows, samples, weights, FAINT_SHARE * unseen))
-            t_vals = t_vals.index_copy(0, holding, here.t_vals + AT_ONCE * spacing)
+            before = light.index_select(0, here.numbers)[:, None]
+            after = before * torch.exp(-depths.cumsum(-1))
+            weights = torch.cat((before, after[:, :-1]), dim=-1) - after
+            light.index_copy_(0, here.numbers, after[:, -1])
+            errors.index_add_(0, here.numbers, (after * off).square().sum(-1))
+            groups.append(_group(here.numbers, samples, weights, FAINT_SHARE * unseen))
+            t_vals.index_copy_(0, holding, here.t_vals + AT_ONCE * spacing)
             num_samples += samples.numel()
-        on = ((t_vals < way.ends) & (light[way.rows] > unseen)).nonzero()[:, 0]
-        way = _UnderWay(way.rows, way.origins, way.directions, t_vals, way.ends)[on]
+        on = ((t_vals < way.ends) & (light.index_select(0, way.numbers) > unseen)).nonzero()[:, 0]
+        way = replace(way, t_vals=t_vals).rows(on)
     found = [torch.cat(parts) for parts in zip(*groups, strict=True)]
     return Seen(found[0], found[1], found[2], light, far, errors.sqrt(), num_samples)
 
 
-def _group(rows: Tensor, samples: Tensor, weights: Tensor, least: float) -> tuple[Tensor, Tensor, Tensor]:
+def _group(numbers: Tensor, samples: Tensor, weights: Tensor, least: float) -> tuple[Tensor, Tensor, Tensor]:
     """Rays, middles, m, and weights (P,) of groups of samples (r, S) that take enough light."""
     total = weights.sum(-1)
     chosen = (total > least).nonzero()[:, 0]
-    middles = (weights * samples).sum(-1)[chosen] / total[chosen]
-    return rows[chosen], middles, total[chosen]
+    total, middles = total.index_select(0, chosen), (weights * samples).sum(-1).index_select(0, chosen)
+    return numbers.index_select(0, chosen), middles / total, total
 
 
-def _gaps_at(grid: BakedGrid, way: _UnderWay) -> Tensor:
-    """Cells (r,) from where rays are to the next one that holds something."""
+def _free_way(grid: BakedGrid, way: _UnderWay) -> tuple[Tensor, Tensor]:
+    """Cells (r,) from where rays are to the next one that holds something, and how far they may go on until then, m; 0 in it."""
     size_x, size_y, size_z = grid.gaps.shape
-    x, y, z = way.at(way.t_vals[:, None])[:, 0].int().unbind(-1)
-    flat = (x.clamp_(0, size_x - 1) * size_y + y.clamp_(0, size_y - 1)) * size_z + z.clamp_(0, size_z - 1)
-    return grid.gaps.reshape(-1)[flat].to(way.t_vals.dtype)
-
-
-def _free_way(way: _UnderWay, gap: Tensor) -> Tensor:
-    """How far rays (r,) may go on until they come to a cell that may hold something, m; 0 in one that does."""
     at = way.at(way.t_vals[:, None])[:, 0]
+    x, y, z = at.int().unbind(-1)
+    flat = (x.clamp(0, size_x - 1) * size_y + y.clamp(0, size_y - 1)) * size_z + z.clamp(0, size_z - 1)
+    gap = grid.gaps.reshape(-1).index_select(0, flat)
     inside = at - at.floor()
     left = torch.where(way.directions < 0.0, inside, 1.0 - inside)  # to the border of the own cell
-    free = ((left + (gap - 1.0)[:, None]) / way.directions.abs().clamp_min(1e-6)).amin(-1) + BORDER
-    return torch.where(gap > 0.0, free, 0.0)
+    across = (left + (gap - 1.0)[:, None]) / way.directions.abs().clamp_min(1e-6)
+    free = torch.minimum(torch.minimum(across[:, 0], across[:, 1]), across[:, 2]) + BORDER
+    return gap, torch.where(gap > 0, free, 0.0)
 
 
 def _read(grid: BakedGrid, at: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:

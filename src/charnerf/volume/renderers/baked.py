@@ -89,18 +89,19 @@ class BakedRenderer(AbstractRenderer):
     def _colored(self, field: BakedField, rays: RayBundle, seen: Seen) -> Rendering:
         """Give what rays (R,) see its colours."""
         num_rays, unseen = len(seen.passed), UNSEEN_SHARE * self.tolerance
-        along = rays.directions[seen.rows]
-        points = torch.addcmul(rays.origins[seen.rows], along, seen.t_vals[:, None])
+        from_ = rays.rows(seen.rows)
+        along, points = from_.directions, torch.addcmul(from_.origins, from_.directions, seen.t_vals[:, None])
         rgb, errors = field.colors_at(points, along)
         opacity = torch.where(seen.passed > unseen, 1.0 - seen.passed, 1.0)
         counted = _by_ray(seen, seen.weights)
         # what was too little to count, or behind all light, has the colour of the rest
-        share = seen.weights * (opacity / counted.clamp_min(1e-6))[seen.rows]
-        off = _by_ray(seen, (share * errors).square()).sqrt()
-        asked = (off > EXACT_SHARE * self.tolerance)[seen.rows].nonzero()[:, 0]
-        if field.source is not None and len(asked):
+        share = seen.weights * (opacity / counted.clamp_min(1e-6)).index_select(0, seen.rows)
+        squares = (share * errors).square()
+        asked = self._distrusted(seen, squares)
+        if field.source is not None:
             rgb[asked] = field.exact_colors(points[asked], along[asked])
-            off[seen.rows[asked]] = 0.0
+            squares[asked] = 0.0
+        off = _by_ray(seen, squares).sqrt()
         uncounted = torch.where(counted > 0.0, 0.0, opacity)
         estimated = (off.square() + seen.errors.square()).sqrt() + uncounted
         moment = _by_ray(seen, seen.weights * seen.t_vals)
@@ -127,6 +128,17 @@ class BakedRenderer(AbstractRenderer):
                 num_unresolved=int((estimated > self.tolerance).sum()),
             ),
         )
+
+    def _distrusted(self, seen: Seen, squares: Tensor) -> Tensor:
+        """Groups by number that the field is asked for, so that the rest of a ray's errors (P,), squared, is small enough.
+
+        Of the rays whose error is too large those that have more of it than what is allowed leaves to each: all others together
+        stay within that.
+        """
+        allowed = (EXACT_SHARE * self.tolerance) ** 2
+        each = allowed / _by_ray(seen, torch.ones_like(squares))
+        too_large = (_by_ray(seen, squares) > allowed).index_select(0, seen.rows)
+        return (too_large & (squares > each.index_select(0, seen.rows))).nonzero()[:, 0]
 
 
 def _by_ray(seen: Seen, values: Tensor) -> Tensor:
