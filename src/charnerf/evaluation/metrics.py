@@ -10,7 +10,6 @@ import torch
 from scipy import ndimage
 from scipy.spatial import cKDTree
 from torch import Tensor
-from torchmetrics.functional.image import structural_similarity_index_measure
 
 from charnerf.checks import check_finite, check_last_dim, check_same_shape
 from charnerf.errors import DataError, ShapeError
@@ -124,6 +123,9 @@ def ssim(prediction: Tensor, truth: Tensor) -> float:
 
     Source: Wang 2004; torchmetrics.
     """
+    # its import takes seconds, that nothing else here needs
+    from torchmetrics.functional.image import structural_similarity_index_measure
+
     check_pair(prediction, truth)
     pictures = [picture.float().movedim(-1, 0)[None].contiguous() for picture in (prediction, truth)]
     value = structural_similarity_index_measure(pictures[0], pictures[1], data_range=1.0)

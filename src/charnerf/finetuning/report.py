@@ -7,8 +7,6 @@ import math
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.files import write_folder_aside
 from charnerf.finetuning.finetune import LEARNING, CurvePoint, Finetuned
@@ -62,6 +60,8 @@ def write_curve(done: Finetuned, path: Path) -> None:
 
 def plot_curve(done: Finetuned, path: Path) -> None:
     """PSNR of held-out patches, and likeness of novel views to the start, against seconds."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(7.5, 4.0), layout="constrained")
     axes = figure.add_subplot()
     seconds = [point.seconds for point in done.curve]

@@ -3,12 +3,14 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import torch
 from omegaconf import DictConfig, OmegaConf
 from safetensors import safe_open
 from safetensors.torch import save
 from torch import Tensor
+from torch.overrides import TorchFunctionMode
 
 from charnerf.config import MODEL_SECTIONS, validate_model
 from charnerf.config.foreign import chosen_sections, parse_json, read_yaml
@@ -79,7 +81,7 @@ def _check_shapes(cfg: DictConfig, state: Mapping[str, Tensor]) -> None:
     Raises:
         RuntimeError: If it does not.
     """
-    with torch.device("meta"):
+    with torch.device("meta"), _Undrawn():
         expected = build_model(cfg).state_dict()
     for name in [*expected, *state]:
         if name not in state or name not in expected:
@@ -87,6 +89,15 @@ def _check_shapes(cfg: DictConfig, state: Mapping[str, Tensor]) -> None:
             raise RuntimeError(f"{name} is not in its {where}")
         if not isinstance(state[name], Tensor) or state[name].shape != expected[name].shape:
             raise RuntimeError(f"size mismatch for {name}, expected {tuple(expected[name].shape)}")
+
+
+class _Undrawn(TorchFunctionMode):
+    """Draws no normal numbers: where tensors hold none, torch would import symbolic mathematics for it, a second long."""
+
+    def __torch_function__(
+        self, func: Any, types: Any, args: tuple[Any, ...] = (), kwargs: dict[str, Any] | None = None
+    ) -> Any:
+        return args[0] if func is Tensor.normal_ else func(*args, **(kwargs or {}))
 
 
 def save_weights(path: str | Path, model: CharNeRF, cfg: DictConfig, *, note: str | None = None) -> Path:
