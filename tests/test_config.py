@@ -31,7 +31,12 @@ MODEL_GROUPS = (
 
 def overrides_for(option: Path) -> list[str]:
     overrides = [f"{option.parent}={option.stem}"]
-    needs_root = option.as_posix() in ("data/folder.yaml", "data/foreign.yaml", "data/shards.yaml")
+    needs_root = option.as_posix() in (
+        "data/folder.yaml",
+        "data/foreign.yaml",
+        "data/joined.yaml",
+        "data/shards.yaml",
+    )
     return [*overrides, "data.root=/tmp"] if needs_root else overrides
 
 

@@ -80,6 +80,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "schedule": ("charnerf.schedule.PhaseSchedule",),
     "phase": ("charnerf.schedule.Phase",),
     "data": (
+        "charnerf.capture.joined_data.JoinedData",
         "charnerf.capture.procedural_data.ProceduralData",
         "charnerf.capture.shapes_data.ShapesData",
         "charnerf.data.folder.FolderData",
