@@ -1,8 +1,10 @@
 """Which checkpoint a run goes on from, and what happens where it is broken, another's, or can not be written."""
 
 import logging
+import multiprocessing
 import subprocess
 import sys
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -15,8 +17,10 @@ from charnerf.files import named_full_disk
 from charnerf.inference.checkpoint_file import read_checkpoint, write_checkpoint
 from charnerf.inference.weights import load_config
 from charnerf.training import run as run_module
+from charnerf.training import run_lock
 from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.run import run_training
+from charnerf.training.run_lock import RunLock
 from support import small_runs
 
 SMALL = ("encoder=single", "scale.steps=4", "validation.times=4")
@@ -210,6 +214,41 @@ def test_a_disk_that_takes_no_checkpoint_is_one_message_and_status_1(figure_data
     assert "the checkpoint can not be written (File too large)" in errors[0]
     assert b"Traceback" not in done.stderr
     assert not list((tmp_path / "run/checkpoints").iterdir())
+
+
+def test_two_commands_do_not_work_in_one_folder(figure_dataset, tmp_path, no_finish, monkeypatch):
+    cfg = small_runs.smoke_config(figure_dataset, "ckpt_path=last", *SMALL)
+    monkeypatch.setattr(run_lock, "PATIENCE", 0.2)
+    with RunLock(tmp_path) as other:
+        other.take()
+        with pytest.raises(ConfigError, match=r"hydra\.run\.dir: .* is worked in by another command"):
+            run_training(cfg, tmp_path)
+        assert [file.name for file in tmp_path.iterdir()] == [".run.lock"]
+    with RunLock(tmp_path) as free:
+        free.take()
+
+
+def _stay(lock: RunLock, tell: Connection) -> None:
+    tell.send(lock.folder)
+    tell.recv()
+
+
+@pytest.mark.slow
+def test_a_folder_is_free_once_the_last_process_of_a_command_has_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_lock, "PATIENCE", 0.2)
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    with RunLock(tmp_path) as command:
+        command.take()
+        process = context.Process(target=_stay, args=(command, there))
+        process.start()
+        assert here.recv() == tmp_path
+    with RunLock(tmp_path) as next_one, pytest.raises(ConfigError, match="another command"):
+        next_one.take()
+    here.send("end")
+    process.join()
+    with RunLock(tmp_path) as next_one:
+        next_one.take()
 
 
 def test_a_full_disk_is_named_by_its_folder(tmp_path):

@@ -29,6 +29,7 @@ from charnerf.training.finish import finish_run
 from charnerf.training.identity import RunIdentity, WrittenRun, data_of, written_run
 from charnerf.training.module import TrainingModule
 from charnerf.training.processes import first_speaks, meet, processes_to_begin, run_processes
+from charnerf.training.run_lock import RunLock
 from charnerf.training.start import begin
 from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
 from charnerf.training.trainer import build_trainer, log_hyperparameters
@@ -84,33 +85,35 @@ def run_training(
     _hush_lightning()
     count = processes_to_begin(cfg)
     share = meet(cfg) if count == 1 else Share()
-    if share.processes > 1:
-        with first_speaks(share):
-            _train_in(lambda: None, _from_first(cfg, folder, accepted, share), share)
-        return
-    prepared, network = _prepare(cfg, folder)
-    accepted()
-    if count == 1:
-        _train(prepared, network)
-        return
-    log.info("Trains in %d processes; rays, points and characters a step are of each.", count)
-    with held():  # they have a checkpoint to write
-        run_processes(partial(_train_in, begin_process, prepared), count)
+    with RunLock(folder) as lock:
+        if share.processes > 1:
+            with first_speaks(share):
+                _train_in(lambda: None, lock, _from_first(cfg, lock, accepted, share), share)
+            return
+        prepared, network = _prepare(cfg, lock)
+        accepted()
+        if count == 1:
+            _train(prepared, network)
+            return
+        log.info("Trains in %d processes; rays, points and characters a step are of each.", count)
+        with held():  # they have a checkpoint to write
+            run_processes(partial(_train_in, begin_process, lock, prepared), count)
 
 
-def _train_in(begin_process: Callable[[], object], prepared: _Prepared, share: Share) -> None:
-    """Train as one process of several."""
+def _train_in(begin_process: Callable[[], object], lock: RunLock, prepared: _Prepared, share: Share) -> None:
+    """Train as one process of several; each holds the folder."""
     _hush_lightning()
     begin_process()
-    _train(prepared, _begin(prepared.cfg, prepared.checkpoint))
+    with lock:
+        _train(prepared, _begin(prepared.cfg, prepared.checkpoint))
 
 
-def _from_first(cfg: DictConfig, folder: Path, accepted: Callable[[], object], share: Share) -> _Prepared:
+def _from_first(cfg: DictConfig, lock: RunLock, accepted: Callable[[], object], share: Share) -> _Prepared:
     """What the first of several processes prepares, its folder too; its error is that of all."""
     outcome: _Prepared | Exception | None = None
     if share.process == 0:
         try:
-            outcome, _ = _prepare(cfg, folder)
+            outcome, _ = _prepare(cfg, lock)
             accepted()
         except Exception as error:
             outcome = error
@@ -127,12 +130,14 @@ def _hush_lightning() -> None:
         logging.getLogger(name).setLevel(logging.WARNING)
 
 
-def _prepare(cfg: DictConfig, folder: Path) -> tuple[_Prepared, _Network]:
-    """Check everything that can be checked before the work, and make the data set."""
+def _prepare(cfg: DictConfig, lock: RunLock) -> tuple[_Prepared, _Network]:
+    """Check everything that can be checked before the work, hold the folder, and make the data set."""
+    folder = lock.folder
     source: AbstractData = build_part(cfg.data)
     source.check_image_size(cfg.scale.image_size)
     source.check_splits(**cfg.splits)
     folder.mkdir(parents=True, exist_ok=True)
+    lock.take()
     checkpoint = find_checkpoint(cfg.ckpt_path, folder)
     before = None if checkpoint is None else written_run(checkpoint)
     if before is not None:
