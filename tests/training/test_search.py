@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +12,10 @@ import pytest
 from omegaconf import DictConfig, OmegaConf
 
 from charnerf.config.search_space import Choice, Interval, SearchSpace
-from charnerf.errors import ConfigError
+from charnerf.errors import ConfigError, DataError
+from charnerf.interruption import Stopped
 from charnerf.training.cells import cells_of
-from charnerf.training.search import Search, color_error
+from charnerf.training.search import JOURNAL, Search, color_error
 
 ROOT = Path(__file__).resolve().parents[2]
 LATER = ("psnr_union", "lpips_vgg", "haze", "parts_lost")  # figures that the file does not have
@@ -85,6 +87,86 @@ def test_a_folder_holds_one_search(tmp_path: Path) -> None:
         search(tmp_path, seconds="mesh")
     with pytest.raises(ConfigError, match="fixed"):
         search(tmp_path, SearchSpace(("seed=1",), SPACE.free))
+
+
+def journal(folder: Path, *records: dict) -> None:
+    """Append to a journal, as its format allows anybody."""
+    with (folder / JOURNAL).open("a") as file:
+        file.writelines(json.dumps({"worker_id": "stranger", **one}) + "\n" for one in records)
+
+
+def begun(**chosen: tuple[object, object]) -> dict:
+    """A run that was begun: operation 4, a trial of study 0, with values and distributions."""
+    return {
+        "op_code": 4,
+        "study_id": 0,
+        "datetime_start": "2026-01-01T00:00:00.000000",
+        "state": 0,
+        "params": {key: value for key, (value, _) in chosen.items()},
+        "distributions": {key: kind.replace("'", '"') for key, (_, kind) in chosen.items()},
+        "user_attrs": {},
+        "system_attrs": {},
+        "intermediate_values": {},
+    }
+
+
+ANY = "{'name': 'CategoricalDistribution', 'attributes': {'choices': ['[subprocess]', 'subprocess.Popen', '8']}}"
+WASTE = (
+    2.0,
+    "{'name': 'FloatDistribution', 'attributes': {'low': 1.0, 'high': 3.0, 'step': null, 'log': false}}",
+)
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        {"width": (2, ANY), "waste": WASTE},
+        {"width": (2, ANY)},
+        {"trusted_targets": (0, ANY), "encoder._target_": (1, ANY)},
+    ],
+    ids=["a value", "one is missing", "another key"],
+)
+def test_a_strangers_journal_adds_nothing_to_the_command_line(tmp_path: Path, chosen: dict) -> None:
+    search(tmp_path)
+    journal(tmp_path, begun(**chosen))
+    training = Training()
+    with pytest.raises(DataError, match=r"search\.log: run 0: found .*, expected a choice of width, waste"):
+        search(tmp_path).run(2, compose, train=training)
+    assert not training.asked
+
+
+@pytest.mark.parametrize(
+    "content", [b"\xff\n{}\n", b"[]\n{}\n", b'{"op_code": 99}\n', b"{}\n" + b"{\n" * 2, b"[" * 5000 + b"\n\n"]
+)
+def test_a_broken_journal_is_named(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / JOURNAL).write_bytes(content)
+    with pytest.raises(DataError, match=r"search\.log: can not be read"):
+        search(tmp_path)
+
+
+def test_a_line_that_a_full_disk_cut_off_is_left_out(tmp_path: Path) -> None:
+    search(tmp_path).run(2, compose, train=Training())
+    with (tmp_path / JOURNAL).open("ab") as file:
+        file.write(b'{"op_code": 6, "wor')
+    training = Training()
+    search(tmp_path).run(4, compose, train=training)
+    assert len(training.asked) == 2 and len(search(tmp_path).front()) >= 1
+
+
+def test_an_interrupted_run_is_gone_on_with_first(tmp_path: Path) -> None:
+    """A signal leaves the cell interrupted and the trial begun: the next call trains the same config into the same folder."""
+
+    def interrupted(cfg: DictConfig, folder: Path) -> None:
+        raise Stopped(signal.SIGTERM)
+
+    with pytest.raises(Stopped):
+        search(tmp_path).run(3, compose, train=interrupted)
+    assert [cell.state for cell in cells_of(tmp_path)] == ["interrupted"]
+    training = Training()
+    search(tmp_path).run(3, compose, train=training)
+    assert len(training.asked) == 3 and [cell.state for cell in cells_of(tmp_path)] == ["done"] * len(
+        {json.dumps(one) for one in training.asked}
+    )
 
 
 def test_errors_are_those_of_psnr() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from hydra.core.override_parser.types import IntervalSweep, Override
 
 from charnerf.config.overrides import config_files, parse_overrides
-from charnerf.errors import ConfigError
+from charnerf.errors import ConfigError, DataError
 
 Value = str | int | float
 
@@ -23,6 +23,10 @@ class Choice:
         """Values that show whether all are valid."""
         return self.values
 
+    def holds(self, value: object) -> bool:
+        """Whether a value is one of them."""
+        return value in self.values
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -37,6 +41,11 @@ class Interval:
     def probes(self) -> tuple[Value, ...]:
         """Values that show whether all are valid."""
         return (int(self.low), int(self.high)) if self.is_whole else (self.low, self.high)
+
+    def holds(self, value: object) -> bool:
+        """Whether a value is one of them."""
+        is_number = isinstance(value, int if self.is_whole else int | float) and not isinstance(value, bool)
+        return is_number and self.low <= value <= self.high  # type: ignore[operator]
 
 
 @dataclass(frozen=True)
@@ -54,6 +63,17 @@ class SearchSpace:
     def overrides(self, chosen: Mapping[str, Value]) -> list[str]:
         """The overrides of a run."""
         return [*self.fixed, *(f"{key}={value}" for key, value in chosen.items())]
+
+    def check(self, chosen: Mapping[str, object], where: str) -> None:
+        """Check what a search's journal, perhaps a stranger's, says was chosen: it becomes part of a command line.
+
+        Raises:
+            DataError: If a key or value can not have been chosen.
+        """
+        if chosen.keys() != self.free.keys() or not all(self.free[key].holds(chosen[key]) for key in chosen):
+            raise DataError(
+                f"{where}: found {str(dict(chosen))[:200]}, expected a choice of {', '.join(self.free)}."
+            )
 
     def probes(self) -> list[list[str]]:
         """Overrides of runs that take each value once, others at their first."""

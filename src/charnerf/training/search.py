@@ -5,6 +5,7 @@ import io
 import json
 import logging
 import math
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from omegaconf import DictConfig
 from charnerf.config.problems import differing
 from charnerf.config.search_space import Choice, Interval, SearchSpace
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import write_text
+from charnerf.files import read_bytes, write_text
 from charnerf.reporting.run_files import read_metrics
 from charnerf.training.cells import DONE, cell_folder, run_cell
 from charnerf.training.run import run_training
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 JOURNAL, FRONT, STUDY = "search.log", "front.csv", "charnerf"
+MOST_JOURNAL = 256 * 2**20  # bytes
 
 
 @dataclass(frozen=True)
@@ -48,19 +50,14 @@ class Search:
 
     Raises:
         ConfigError: If the folder holds another search, or Optuna is missing.
+        DataError: If its journal can not be read.
     """
 
     def __init__(self, folder: Path, space: SearchSpace, *, seconds: str, seed: int) -> None:
         self.folder, self.space, self.seconds, self.seed = folder, space, seconds, seed
         self._optuna = _optuna()
         folder.mkdir(parents=True, exist_ok=True)
-        backend = self._optuna.storages.journal.JournalFileBackend(str(folder / JOURNAL))
-        self._study = self._optuna.create_study(
-            storage=self._optuna.storages.JournalStorage(backend),
-            study_name=STUDY,
-            directions=["minimize", "minimize"],
-            load_if_exists=True,
-        )
+        self._study = self._open_study()
         self._check_same()
 
     def run(
@@ -77,8 +74,8 @@ class Search:
             compose: Makes a config of overrides.
             train: Trains a config into a folder.
         """
-        for trial in self._study.get_trials(states=[self._optuna.trial.TrialState.RUNNING]):
-            self._work(trial.number, trial.params, compose, train)
+        for begun in self._study.get_trials(states=[self._optuna.trial.TrialState.RUNNING]):
+            self._work(begun.number, begun.params, compose, train)
         while (number := len(self._study.get_trials(deepcopy=False))) < trials:
             self._study.sampler = self._optuna.samplers.TPESampler(seed=self.seed + 1_000_003 * number)
             trial = self._study.ask({key: self._distribution(one) for key, one in self.space.free.items()})
@@ -101,6 +98,36 @@ class Search:
         write_text(self.folder / FRONT, text.getvalue())
         return self.folder / FRONT
 
+    def _open_study(self) -> "optuna.Study":
+        """Read the journal, perhaps a stranger's, or begin one; a line that a full disk cut off goes: the next would join it."""
+        file = self.folder / JOURNAL
+        journal = self._optuna.storages.journal
+        lock = journal.JournalFileOpenLock(
+            str(file)
+        )  # the default one hangs on what a kill leaves, where paths are relative
+        try:
+            if file.exists():
+                raw = read_bytes(file, most=MOST_JOURNAL)
+                if raw and not raw.endswith(b"\n"):
+                    lock.acquire()
+                    try:
+                        os.truncate(file, raw.rfind(b"\n") + 1)
+                    finally:
+                        lock.release()
+            return self._optuna.create_study(
+                storage=self._optuna.storages.JournalStorage(journal.JournalFileBackend(str(file), lock)),
+                study_name=STUDY,
+                directions=["minimize", "minimize"],
+                load_if_exists=True,
+            )
+        except (DataError, OSError):
+            raise
+        except Exception as error:  # Optuna checks nothing of what it reads
+            raise DataError(
+                f"{file}: can not be read ({type(error).__name__}: {error}), expected a journal of `charnerf search`; name another"
+                " folder."
+            ) from error
+
     def _work(
         self,
         number: int,
@@ -108,6 +135,7 @@ class Search:
         compose: Callable[[list[str]], DictConfig],
         train: Callable[[DictConfig, Path], None],
     ) -> None:
+        self.space.check(chosen, f"{self.folder / JOURNAL}: run {number}")
         cfg = compose(self.space.overrides(chosen))
         name = "+".join(f"{key}-{value}" for key, value in chosen.items())
         cell = run_cell(cfg, self.folder, name=name, job_folder=self.folder, train=train)
