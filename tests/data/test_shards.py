@@ -124,12 +124,35 @@ def changed(shards: Path, tmp_path: Path, content: bytes) -> Path:
     return copy
 
 
-def archive(name: str) -> bytes:
+def archive(*names: str) -> bytes:
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
-        member = tarfile.TarInfo(name)
-        member.size = 3
-        tar.addfile(member, io.BytesIO(b"abc"))
+        for name in names:
+            member = tarfile.TarInfo(name)
+            member.size = 3
+            tar.addfile(member, io.BytesIO(b"abc"))
+    return buffer.getvalue()
+
+
+def sparse_archive() -> bytes:
+    """A file of a terabyte of nothing, in some bytes."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as tar:
+        member = tarfile.TarInfo("000000.a")
+        gaps = {"major": "1", "minor": "0", "name": "000000.a", "realsize": str(10**12)}
+        member.pax_headers = {f"GNU.sparse.{key}": value for key, value in gaps.items()}
+        body = b"1\n999999999990\n3\n".ljust(512, b"\0") + b"abc"
+        member.size = len(body)
+        tar.addfile(member, io.BytesIO(body))
+    return buffer.getvalue()
+
+
+def linked_archive() -> bytes:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
+        member = tarfile.TarInfo("000000.a")
+        member.type, member.linkname = tarfile.SYMTYPE, "/etc/passwd"
+        tar.addfile(member)
     return buffer.getvalue()
 
 
@@ -137,6 +160,10 @@ def archive(name: str) -> bytes:
     ("content", "message"),
     [
         (archive("000000.%2Fetc%2Fx"), "leads out"),
+        (archive("000000.a", "000000.a%2Fb"), "as a file and as a folder"),
+        (archive("000000.a%2Fb", "000000.a"), "as a file and as a folder"),
+        (sparse_archive(), "which is no plain file"),
+        (linked_archive(), "which is no plain file"),
         (archive("000000...%2F..%2F..%2Fx"), "leads out"),
         (b"no tar file", "found no plain tar file"),
         (archive("000000.a")[:700], "can not be read"),

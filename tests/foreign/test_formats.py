@@ -1,5 +1,6 @@
 """Every format, written in its own conventions: one and the same figure comes out, standing as ours stand."""
 
+import gzip
 import json
 import os
 import shutil
@@ -12,6 +13,7 @@ import torch
 from PIL import Image
 
 from charnerf.cli import run
+from charnerf.data import json_values
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
@@ -225,6 +227,24 @@ def test_archives_of_strangers_run_nothing(shown: tuple, tmp_path: Path) -> None
     np.savez(tmp_path / "nmr/cameras.npz", world_mat_0=np.array([{}], dtype=object))
     with pytest.raises(DataError, match=r"cameras\.npz: can not be read"):
         read(tmp_path / "nmr", tmp_path)
+
+
+def test_archives_and_lists_of_strangers_fill_no_memory(
+    shown: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sets.write_nmr(tmp_path / "nmr", *shown)
+    np.savez_compressed(tmp_path / "nmr/cameras.npz", world_mat_0=np.zeros(10_000_000))
+    assert (tmp_path / "nmr/cameras.npz").stat().st_size < 100_000
+    with pytest.raises(DataError, match=r"cameras\.npz: found 80000\d* bytes once unpacked"):
+        read(tmp_path / "nmr", tmp_path)
+    sets.write_co3d(tmp_path / "co3d", *shown)
+    with gzip.open(tmp_path / "co3d/frame_annotations.jgz", "wb") as file:
+        file.write(b"[" + b"[]," * 1001 + b"[]]")
+    sets.write_nerfstudio(tmp_path / "many", *shown, crop=[[]] * 1001)
+    monkeypatch.setattr(json_values, "MOST_VALUES", 1000)
+    for name in ("co3d/frame_annotations.jgz", "many/transforms.json"):
+        with pytest.raises(DataError, match=rf"{name}: found 1\d\d\d values, expected at most 1000"):
+            read((tmp_path / name).parent, tmp_path)
 
 
 def test_a_folder_of_nothing_names_what_would_do(tmp_path: Path) -> None:

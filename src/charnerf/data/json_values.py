@@ -7,7 +7,18 @@ from typing import Any
 from charnerf.errors import DataError
 
 MOST_PIXELS = 16_384  # a side
+MOST_VALUES = 10_000_000  # of a file; one takes up to 100 bytes of memory
 _LARGEST = 1e30  # of any number of a camera
+
+
+def check_commas(found: int, where: str) -> None:
+    """Check before it is parsed that a JSON text means no more than memory holds: `[],` is three bytes on the disk.
+
+    Raises:
+        DataError: If it has more commas than values are allowed.
+    """
+    if found > MOST_VALUES:
+        raise DataError(f"{where}: found {found} values, expected at most {MOST_VALUES}.")
 
 
 def count(where: str, values: Mapping[str, Any], key: str) -> int:

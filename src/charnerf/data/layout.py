@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from charnerf.data.json_values import check_commas
 from charnerf.errors import DataError
 from charnerf.files import locked, read_text, write_text
 
@@ -75,7 +76,9 @@ def read_json(path: Path) -> dict[str, Any]:
         DataError: If the file is missing, unreadable or holds anything else.
     """
     try:
-        content = json.loads(read_text(path))
+        text = read_text(path)
+        check_commas(text.count(","), str(path))
+        content = json.loads(text)
     except DataError:
         raise
     except FileNotFoundError as err:

@@ -12,6 +12,7 @@ import io
 import json
 import os
 import shutil
+import tarfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -249,8 +250,13 @@ def _unpack(root: Path, shard: Shard, content: bytes) -> None:
         try:
             for member, body in members.items():
                 file = inside(aside, member, where)
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.write_bytes(body)
+                try:
+                    file.parent.mkdir(parents=True, exist_ok=True)
+                    file.write_bytes(body)
+                except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
+                    raise DataError(
+                        f"{where}: found {member[:200]!r} as a file and as a folder, expected one of them."
+                    ) from error
             shutil.rmtree(root / name, ignore_errors=True)
             aside.rename(root / name)
         finally:
@@ -261,6 +267,7 @@ def _samples(content: bytes, where: str) -> Iterator[dict[str, bytes]]:
     """Files of the characters of a tar, by their paths."""
     reader = _webdataset().tariterators
     try:
+        _check_plain(content, where)
         files = ({**one, "__url__": where} for one in reader.tar_file_iterator(io.BytesIO(content)))
         for sample in reader.group_by_keys(files, lcase=False):
             members = {unquote(key): body for key, body in sample.items() if not key.startswith("__")}
@@ -275,6 +282,14 @@ def _samples(content: bytes, where: str) -> Iterator[dict[str, bytes]]:
         raise DataError(
             f"{where}: can not be read ({type(error).__name__}: {error}); pack the data set again."
         ) from error
+
+
+def _check_plain(content: bytes, where: str) -> None:
+    """Check that a tar holds files alone, whose bytes are there: the gaps of a sparse one may fill the memory."""
+    with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as members:
+        for one in members:
+            if not one.isfile() or one.issparse():
+                raise DataError(f"{where}: found {one.name[:200]!r}, which is no plain file.")
 
 
 def _fetch(address: str, most: int) -> bytes:

@@ -16,7 +16,7 @@ from typing import Any, final
 import numpy as np
 import torch
 
-from charnerf.data.json_values import number, section, shown
+from charnerf.data.json_values import check_commas, number, section, shown
 from charnerf.data.transforms import MOST_FRAMES, check_pose
 from charnerf.errors import DataError
 from charnerf.files import inside, open_regular
@@ -148,6 +148,7 @@ def _frames(file: Path, changed: int) -> Frames:
             text = stream.read(_MOST_BYTES + 1)
         if len(text) > _MOST_BYTES:
             raise DataError(f"{file}: found more than {_MOST_BYTES} bytes of text, expected fewer.")
+        check_commas(text.count(b","), str(file))
         content = json.loads(text)
     except (OSError, EOFError, zlib.error, ValueError, RecursionError) as error:
         if isinstance(error, DataError):

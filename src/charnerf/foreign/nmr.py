@@ -1,6 +1,7 @@
 """Renderings of the neural mesh renderer, as DVR and pixelNeRF read them: image/, mask/ and cameras.npz of every object."""
 
 import io
+import zipfile
 from pathlib import Path
 from typing import Any, final
 
@@ -84,7 +85,12 @@ def _shot(
 def _matrices(file: Path) -> dict[str, np.ndarray]:
     """Arrays of numbers of an NPZ, which may hold no objects: those would run code."""
     try:
-        with np.load(io.BytesIO(read_bytes(file, most=_MOST_BYTES)), allow_pickle=False) as archive:
+        content = io.BytesIO(read_bytes(file, most=_MOST_BYTES))
+        with zipfile.ZipFile(content) as members:
+            unpacked = sum(one.file_size for one in members.infolist())
+        if unpacked > _MOST_BYTES:
+            raise DataError(f"{file}: found {unpacked} bytes once unpacked, expected at most {_MOST_BYTES}.")
+        with np.load(content, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except FileNotFoundError as error:
         raise DataError(f"{file}: no such file, expected the cameras of the pictures.") from error
