@@ -193,9 +193,9 @@ PARTS: dict[str, Part] = {
     ],
     "threads": lambda setting: thread_rows(setting.say),
     "processes": lambda setting: processes.process_rows(setting.say),
-    "repeats": lambda setting: [
-        repeats.repeat_row(setting.model.source, setting.pictured[0], rounds=repeats.ROUNDS)
-    ],
+    "repeats": lambda setting: repeats.repeat_rows(
+        setting.model.source, setting.pictured[0], rounds=repeats.ROUNDS
+    ),
     "losses": _losses,
     "grids": lambda setting: [
         {"character": one.name, **vars(grid_share(one, cells=256, num_cameras=8))}

@@ -199,8 +199,8 @@ SECTIONS: dict[str, tuple[str, Show]] = {
     "repeats": (
         "Memory of repeated work",
         _table(
-            "`charnerf.load()`, encode, render at 96 pixels, again and again in one process; resident MiB, medians of 20 rounds;"
-            " `growth` from those after the tenth to the last."
+            "The model loaded, a character encoded and rendered at 96 pixels, again and again in one process; and a baked character"
+            " opened and rendered. Resident MiB, medians of 20 rounds; `growth` from those after the tenth to the last."
         ),
     ),
     "losses": (
