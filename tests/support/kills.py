@@ -1,8 +1,8 @@
 """Trainings that are killed again and again: `python -m support.kills DATASET FOLDER KILLS SEED [key=value ...]`.
 
 Short trainings are killed at random moments by SIGKILL, SIGTERM and SIGINT, each goes on by `ckpt_path=last` until it is
-done, and then has to be the training that nobody killed: the same weights, bit by bit, and the same curve. Prints what
-happened as JSON.
+done, and then has to be the training that nobody killed: the same weights, bit by bit, and the same curve. Of a training in
+several processes the signal goes to the command, to one of those that train, or to all at once. Prints what happened as JSON.
 """
 
 import csv
@@ -14,6 +14,7 @@ import sys
 import time
 import traceback
 from collections import Counter
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -26,14 +27,13 @@ from charnerf.training import run, trainer
 from support import small_runs
 
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+_TRAINS = b"spawn_main"  # on the command line of a process that a training begins
 NOT_STEPS = ("seconds",)  # columns of the curve
 
 
 def main(dataset: Path, folder: Path, kills: int, seed: int, settings: list[str]) -> dict[str, Any]:
     """Kill so many times; counts of how attempts ended, and the runs that came out otherwise."""
-    use_fastest_products()
-    run.finish_run = lambda *_, **__: None  # the training alone
-    trainer.CHECKPOINT_EVERY = timedelta(seconds=0.3)  # between validations too
+    begin_process()
     cfg = small_runs.smoke_config(dataset, "ckpt_path=last", *settings)
     rng = random.Random(seed)
     begun = time.monotonic()
@@ -49,6 +49,13 @@ def main(dataset: Path, folder: Path, kills: int, seed: int, settings: list[str]
     return {"kills": sum(ends.values()), "runs": len(runs), "ends": dict(ends), "wrong": wrong}
 
 
+def begin_process() -> None:
+    """Set a process for the training alone, with checkpoints between validations too."""
+    use_fastest_products()
+    run.finish_run = lambda *_, **__: None
+    trainer.CHECKPOINT_EVERY = timedelta(seconds=0.3)
+
+
 def _until_done(
     cfg: DictConfig, folder: Path, rng: random.Random, seconds: float, *, at_most: int
 ) -> Counter[str]:
@@ -59,17 +66,31 @@ def _until_done(
         kill = sum(ends.values()) < at_most
         status = _wait(process, rng.uniform(0.0, seconds) if kill else None)
         if status is None:
-            number = rng.choice(SIGNALS)
-            os.kill(process, number)
+            number, whom = rng.choice(SIGNALS), _whom(process, rng)
+            for one in whom:
+                with suppress(ProcessLookupError):
+                    os.kill(one, number)
             status = _wait(process)
             # 0: it was done just before; a negative status of others than SIGKILL: it did not listen yet
             expected = {0, -number} | ({128 + number} if number != signal.SIGKILL else set())
+            if process not in whom and number == signal.SIGKILL:
+                expected = {0, 1}  # the command says which of its processes was killed
             assert status in expected, f"{number.name}: {status}\n{folder.with_suffix('.log').read_text()}"
-            ends[number.name] += 1
+            ends[f"{number.name} {'all' if len(whom) > 1 else 'command' if process in whom else 'one'}"] += 1
             if status != 0:
                 continue
         assert status == 0, folder.with_suffix(".log").read_text()
         return ends
+
+
+def _whom(process: int, rng: random.Random) -> list[int]:
+    """The command, one of the processes that it has begun to train, or all."""
+    team = []
+    with suppress(OSError):  # some have ended meanwhile
+        for one in Path(f"/proc/{process}/task/{process}/children").read_text().split():
+            if _TRAINS in Path(f"/proc/{one}/cmdline").read_bytes():
+                team.append(int(one))
+    return rng.choice([[process], *([one] for one in team), [process, *team]]) if team else [process]
 
 
 def _start(cfg: DictConfig, folder: Path) -> int:
@@ -84,7 +105,7 @@ def _start(cfg: DictConfig, folder: Path) -> int:
     status = 1
     try:
         with listening():
-            run.run_training(cfg, folder)
+            run.run_training(cfg, folder, begin_process=begin_process)
         status = 0
     except Stopped as stop:
         status = stop.status

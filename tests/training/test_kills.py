@@ -20,8 +20,15 @@ SHORT = ("scale.steps=24", "validation.times=4")
         ("encoder=single", "schedule=constant"),
         ("schedule=two_phase", "averaging.decay=0.9", "augmentation=[recolor,mirror]"),
         ("encoder=single", "schedule=two_phase", "batches.workers=1", "optimizer=adam"),
+        (
+            "encoder=single",
+            "schedule=two_phase",
+            "trainer=ddp",
+            "trainer.accelerator=cpu",
+            "trainer.devices=2",
+        ),
     ],
-    ids=["constant", "averaged", "worker"],
+    ids=["constant", "averaged", "worker", "two processes"],
 )
 def test_killed_trainings_end_as_the_one_that_was_not(figure_dataset, tmp_path, settings):
     command = [sys.executable, "-m", "support.kills", str(figure_dataset), str(tmp_path), str(KILLS), "1"]
