@@ -180,7 +180,7 @@ def test_what_lies_between_square_views_is_left_out_where_these_are_whole(monkey
 
 def test_names_can_be_given():
     pixels, _ = sheet(["front", "side", "back", "right"])
-    named = read_sheet(pixels, order=["back", "side", "front", "-"]).drawings
+    named = read_sheet(pixels, order=["back", "left", "front", "-"]).drawings
     assert [view.name for view in named] == ["front", "left", "back"]
     moved = read_sheet(pixels, figures={"45": 4}).drawings
     assert Viewpoint(45.0) in moved

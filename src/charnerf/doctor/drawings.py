@@ -9,11 +9,11 @@ from charnerf.doctor.figure import CROPPED
 from charnerf.doctor.finding import Finding
 from charnerf.doctor.picture_files import picture_findings
 from charnerf.doctor.repairs import mirror_command
-from charnerf.drawings.align import figure_box
+from charnerf.drawings.align import figure_box, on_one_scale
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import load_drawing
 from charnerf.drawings.naming import looks_left
-from charnerf.drawings.turnaround import read_views
+from charnerf.drawings.turnaround import LOOKS, read_views
 from charnerf.drawings.viewpoints import AZIMUTHS, Viewpoint
 from charnerf.errors import DataError
 from charnerf.pictures import on_white, to_bytes
@@ -85,11 +85,13 @@ def _scales(heights: Mapping[Path, tuple[float, tuple[int, int]]]) -> Iterator[F
 
 
 def _sides(whole: Mapping[Viewpoint, tuple[Path, np.ndarray]]) -> Iterator[Finding]:
-    """Profiles, cut out, that look to the other side than their name says."""
+    """Profiles that look to the other side than their name says by feet and face; with front and back, colours tell better."""
+    if {"front", "back"} <= {view.name for view in whole}:
+        return
     for view, (file, rgba) in whole.items():
         if view.name not in ("left", "right"):
             continue
-        if looks_left(_square(rgba)) != (view.name == "left"):
+        if looks_left(on_one_scale([rgba], [str(file)], SIZE)[0]) != (view.name == "left"):
             other = "right" if view.name == "left" else "left"
             yield Finding(
                 "mirrored picture", str(file), f"a figure that looks to the picture's {other} by its feet and its face",
@@ -117,7 +119,7 @@ def _together(whole: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
         where, _, found = warning.partition(": ")
         fault = (
             "mirrored picture"
-            if "unmirrored" in warning
+            if "unmirrored" in warning or LOOKS in warning
             else "duplicated view"
             if "shows the same" in warning
             else ""
@@ -127,12 +129,3 @@ def _together(whole: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
             fault or "drawings that disagree", where, found, "views that agree", "Mend the drawing.", command,
             picture=read.picture, is_broken=bool(fault),
         )  # fmt: skip
-
-
-def _square(rgba: np.ndarray) -> np.ndarray:
-    """On a square, as canvases are."""
-    side = max(rgba.shape[:2])
-    square = np.zeros((side, side, 4), dtype=rgba.dtype)
-    top, left = side - rgba.shape[0], (side - rgba.shape[1]) // 2
-    square[top:, left : left + rgba.shape[1]] = rgba
-    return square

@@ -4,6 +4,7 @@ Letters: H, W of a drawing; S side of the canvas. A figure's box is measured bel
 it ends where the greatest alpha of a row or column passes one half between two pixel centres.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,17 @@ def figure_box(alpha: np.ndarray, name: str) -> FigureBox:
             "good). Use a larger one."
         )
     return box
+
+
+def on_one_scale(cutouts: Sequence[np.ndarray], names: Sequence[str], size: int) -> list[np.ndarray]:
+    """Figures RGBA (H, W, 4) on canvases (S, S, 4) of one scale, floor line and axis.
+
+    Raises:
+        DataError: If one is no figure, or too small; the message has its name.
+    """
+    boxes = [figure_box(rgba[..., 3], name) for rgba, name in zip(cutouts, names, strict=True)]
+    extent = half_extent([(rgba[..., 3], box) for rgba, box in zip(cutouts, boxes, strict=True)])
+    return [place(rgba, box, extent=extent, size=size) for rgba, box in zip(cutouts, boxes, strict=True)]
 
 
 def half_extent(figures: list[tuple[np.ndarray, FigureBox]]) -> float:

@@ -15,6 +15,7 @@ from charnerf.drawings.viewpoints import Viewpoint, viewpoint
 from charnerf.reconciling.agreement import iou
 
 HEAD, FEET, SHINS = (0.0, 0.22), (0.93, 1.0), (0.75, 0.9)  # shares of the height from the top
+TURNED = 0.05  # of the height: offset of feet and face that surely is a turn
 TURNS = {  # views of a sheet by how many there are, in the order in which a figure turns
     2: (("front", "side"), ("front", "back")),
     3: (("front", "side", "back"), ("front", "three-quarter", "side"), ("front", "three-quarter", "back")),
@@ -26,6 +27,8 @@ DOUBTFUL = 0.08  # lead of the best naming over the next one below which the use
 LAYOUT_WEIGHT = 0.1
 FIRST_WEIGHT = 0.25  # of a front that stands before the back
 HALVES_WEIGHT = 4.0
+LOOKS_WEIGHT = 0.1  # of feet and face: they trail in a stride or under a robe, colours do not
+CLEAR_HALVES = 0.02  # agreement of halves beyond which colours alone say where a profile looks
 HEAD_WEIGHT = 4.0  # of rows that show the head: a face tells front from back, clothes often do not
 
 
@@ -46,7 +49,7 @@ class Naming:
 
 @dataclass(frozen=True)
 class _Looks:
-    """What is measured of a figure: how symmetric it is, how much its head shows, which way it looks (-1 left, 1 right)."""
+    """What is measured of a figure: how symmetric it is, how much its head shows, where feet and face look (-1 left, 1 right)."""
 
     symmetry: float
     width: float
@@ -74,7 +77,7 @@ def name_views(canvases: Sequence[np.ndarray]) -> Naming:
     scored.sort(key=lambda one: -one[0])
     best = scored[0][1]
     figures = {index: role for role, index in best.items()}
-    viewpoints = tuple(_viewpoint(figures[index], best, looks) for index in range(len(canvases)))
+    viewpoints = tuple(_viewpoint(figures[index], best, canvases, looks) for index in range(len(canvases)))
     others = [
         score
         for score, by_role in scored
@@ -88,17 +91,38 @@ def name_views(canvases: Sequence[np.ndarray]) -> Naming:
     return Naming(viewpoints, bool(lead < DOUBTFUL), reasons)
 
 
-def looks_left(canvas: np.ndarray) -> bool:
-    """Whether a figure seen from a side (S, S, 4) looks to the picture's left, by its feet and its face."""
-    return _looks(canvas).direction < 0
+def looks_left(side: np.ndarray, front: np.ndarray | None = None, back: np.ndarray | None = None) -> bool:
+    """Whether a figure seen from a side (S, S, 4) looks to the picture's left.
+
+    By its feet and its face; with front and back, on canvases of its scale, by which half of it has whose colours too.
+    """
+    return _turn(side, front, back, _looks(side)) < 0.0
 
 
-def _viewpoint(role: str, best: dict[str, int], looks: Sequence[_Looks]) -> Viewpoint:
+def colors_look_left(side: np.ndarray, front: np.ndarray, back: np.ndarray) -> bool | None:
+    """Whether a profile looks to the picture's left by the colours of front and back alone; None where they do not say clearly."""
+    halves = _halves(front, back, side)
+    return None if abs(halves) < CLEAR_HALVES else halves > 0.0
+
+
+def _turn(side: np.ndarray, front: np.ndarray | None, back: np.ndarray | None, looks: "_Looks") -> float:
+    """How surely a profile looks to the picture's right; below 0 to its left."""
+    by_halves = 0.0 if front is None or back is None else -HALVES_WEIGHT * _halves(front, back, side)
+    return by_halves + LOOKS_WEIGHT * looks.direction
+
+
+def _viewpoint(
+    role: str, best: dict[str, int], canvases: Sequence[np.ndarray], looks: Sequence[_Looks]
+) -> Viewpoint:
     """Azimuth of a role: a figure that looks to the picture's left shows the character's left side."""
     if role in ("front", "back"):
         return viewpoint(role)
-    side = best.get("side")
-    to_left = looks[best[role] if side is None or role == "three-quarter" else side].direction < 0
+    if "side" in best and role != "three-quarter":
+        side, back = best["side"], best.get("back")
+        behind = None if back is None else canvases[back]
+        to_left = _turn(canvases[side], canvases[best["front"]], behind, looks[side]) < 0.0
+    else:
+        to_left = looks[best[role]].direction < 0.0
     if role == "other side":
         to_left = not to_left
     azimuth = {"side": 90.0, "other side": 90.0, "three-quarter": 45.0, "three-quarter back": 135.0}[role]
@@ -116,9 +140,7 @@ def _score(roles: dict[str, int], canvases: Sequence[np.ndarray], looks: Sequenc
         score += FIRST_WEIGHT * (front < back)
         if "side" in roles:
             side = roles["side"]
-            score += HALVES_WEIGHT * _halves(
-                canvases[front], canvases[back], canvases[side], looks[side].direction
-            )
+            score += abs(_turn(canvases[side], canvases[front], canvases[back], looks[side]))
     for role in ("side", "other side"):
         if role in roles:
             score += 1.0 - looks[roles[role]].symmetry + (1.0 - _standing(looks, roles[role], "width"))
@@ -158,14 +180,12 @@ def _looks(canvas: np.ndarray) -> _Looks:
         symmetry=iou(alpha, alpha[:, ::-1]),
         width=float(trunk.sum(axis=1).mean() / height),
         face=float(shown.sum() / max(ndimage.binary_erosion(head, iterations=2).sum(), 1)),
-        direction=float(np.sign(2.0 * ahead + gaze)),
+        direction=float(np.clip((2.0 * ahead + gaze) / (TURNED * height), -1.0, 1.0)),
     )
 
 
-def _halves(front: np.ndarray, back: np.ndarray, side: np.ndarray, direction: float) -> float:
-    """How much better a front fits the half ahead of a side view, and a back the half behind, than swapped; within (-2, 2)."""
-    if direction > 0:
-        side = side[:, ::-1]
+def _halves(front: np.ndarray, back: np.ndarray, side: np.ndarray) -> float:
+    """How much better a front fits the left half of a profile, and a back the right one, than swapped; within (-2, 2)."""
     lab, inside = rgb2lab(side[..., :3]), side[..., 3] > 0.5
     middle = np.array([_middle(row, np.arange(len(row))) for row in inside])
     ahead = inside & (np.arange(side.shape[1]) < middle[:, None] - 0.5)

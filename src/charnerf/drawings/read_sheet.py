@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 from skimage.color import rgb2lab
 
-from charnerf.drawings.align import figure_box, half_extent, place
+from charnerf.drawings.align import on_one_scale
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.naming import MOST_NAMED, looks_left, name_views
@@ -91,10 +91,8 @@ def read_sheet(
 
 def _canvases(sheet: Sheet) -> list[np.ndarray]:
     """The figures cut out and brought to one height, (CANVAS, CANVAS, 4) each."""
-    cut = [cut_out(one.drawing).rgba for one in sheet.figures]
-    boxes = [figure_box(rgba[..., 3], one.drawing.name) for rgba, one in zip(cut, sheet.figures, strict=True)]
-    extent = half_extent([(rgba[..., 3], box) for rgba, box in zip(cut, boxes, strict=True)])
-    return [place(rgba, box, extent=extent, size=CANVAS) for rgba, box in zip(cut, boxes, strict=True)]
+    drawings = [one.drawing for one in sheet.figures]
+    return on_one_scale([cut_out(one).rgba for one in drawings], [one.name for one in drawings], CANVAS)
 
 
 def _views(
@@ -115,13 +113,17 @@ def _views(
         )
     views: dict[int, Viewpoint | None] = dict.fromkeys(range(count))
     if order:
-        views |= {i: None if name == "-" else _named(name, canvases[i]) for i, name in enumerate(order)}
+        shown = {name: canvases[i] for i, name in enumerate(order)}
+        views |= {
+            i: None if name == "-" else _named(name, canvases[i], shown) for i, name in enumerate(order)
+        }
     elif naming is not None:
         views |= dict(enumerate(_square(naming.viewpoints)))
     for name, number in figures.items():
         if not 1 <= number <= count:
             raise DataError(f"--figure {name}={number}: found no such figure, expected 1 to {count}.")
-        wanted = _named(name, canvases[number - 1])
+        shown = {view.name: canvases[i] for i, view in views.items() if view is not None}
+        wanted = _named(name, canvases[number - 1], shown)
         views |= {i: None for i, view in views.items() if view == wanted}
         views[number - 1] = wanted
     return views, naming is not None and naming.is_doubtful and not figures
@@ -133,11 +135,11 @@ def _square(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint | None]:
     return [None if one in left_out else one for one in viewpoints]
 
 
-def _named(name: str, canvas: np.ndarray) -> Viewpoint:
-    """A viewpoint by its name; `side` looks whichever way the figure does."""
+def _named(name: str, canvas: np.ndarray, shown: Mapping[str, np.ndarray]) -> Viewpoint:
+    """A viewpoint by its name; `side` looks whichever way the figure does, by the front and back that are shown."""
     if name != "side":
         return viewpoint(name)
-    return viewpoint("left" if looks_left(canvas) else "right")
+    return viewpoint("left" if looks_left(canvas, shown.get("front"), shown.get("back")) else "right")
 
 
 def _between(views: Mapping[int, Viewpoint | None]) -> list[str]:

@@ -13,6 +13,7 @@ from charnerf.drawings.cutout import Cutout, cut_out, see_through
 from charnerf.drawings.enclosed import shared
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
+from charnerf.drawings.naming import colors_look_left
 from charnerf.drawings.options import ReadingOptions, Segment
 from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.picture import draw_assumptions
@@ -27,6 +28,7 @@ from charnerf.types import SourceViews
 Picture = str | Path | np.ndarray
 LEAST_AGREEMENT = 0.85  # IoU of two outlines that ought to be one; below, the user is warned
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
+LOOKS = "by the colours of front and back it looks"  # of a profile named after its other side
 NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 
 
@@ -247,7 +249,8 @@ def _doubts(
         " worse (docs/drawings.md). Compare without it."
         for one in between_square_ones([figure.viewpoint for figure in figures])
     ]
-    return (*small, *_disagreements(agreement, figures), *_other_designs(canvases, figures), *between)
+    apart = (*_disagreements(agreement, figures), *_other_designs(canvases, figures))
+    return (*small, *_turned_sides(canvases, figures), *apart, *between)
 
 
 def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
@@ -257,6 +260,23 @@ def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list
         for figure in figures
         if figure.box.height * 2.0 * extent / HEIGHT < 0.5 * size
     ]
+
+
+def _turned_sides(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[str]:
+    """Profiles whose front half has the back's colours, so that they look to the other side than their names say."""
+    shown = {figure.viewpoint.name: canvas for figure, canvas in zip(figures, canvases, strict=True)}
+    lines = []
+    for figure in figures:
+        name = figure.viewpoint.name
+        if name not in ("left", "right") or not {"front", "back"} <= set(shown):
+            continue
+        if colors_look_left(shown[name], shown["front"], shown["back"]) == (name == "right"):
+            other = "right" if name == "left" else "left"
+            lines.append(
+                f"{figure.drawing.name}: {LOOKS} to the picture's {other}, and so shows the"
+                f" character's {other} side. If it does, say --side {other}, or of a sheet --figure {other}=N."
+            )
+    return lines
 
 
 def _other_designs(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[str]:
