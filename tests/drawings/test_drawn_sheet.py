@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFont
 
-from charnerf.drawings.align import figure_box, half_extent, place
+from charnerf.drawings.align import figure_box, half_extent, on_one_scale, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array
-from charnerf.drawings.naming import Naming, name_views
+from charnerf.drawings.naming import Naming, colors_look_left, looks_left, name_views
 from charnerf.drawings.read_sheet import read_sheet
 from charnerf.drawings.sheet import find_figures
 from charnerf.drawings.turnaround import read_views
@@ -208,3 +208,28 @@ def test_two_characters_are_noticed():
         pixels[top:bottom, left:right],
     )
     assert any("are they of one character?" in one for one in read_sheet(other).warnings)
+
+
+def test_a_profile_looks_where_its_colours_say_though_its_feet_trail():
+    figures = [figure(view, 300) for view in ("front", "side", "back")]
+    trailing = ImageDraw.Draw(figures[1])  # a robe on the ground behind a figure that looks to the left
+    trailing.rectangle((figures[1].width - 60, 270, figures[1].width, 300), fill=(70, 40, 30, 255))
+    for x in range(0, figures[1].width // 2, 2):  # and no foot before it
+        trailing.line((x, 284, x, 300), fill=(0, 0, 0, 0), width=2)
+    cut = [cut_out(drawing_from_array(np.array(one), "hero")).rgba for one in figures]
+    front, side, back = on_one_scale(cut, ["hero"] * 3, 128)
+    assert looks_left(side, front, back)
+    assert not looks_left(side[:, ::-1], front, back)
+    assert colors_look_left(side, front, back) is True
+    assert colors_look_left(side[:, ::-1], front, back) is False
+
+
+def test_a_profile_named_after_its_other_side_is_warned_of():
+    pictures = {view: np.array(figure(view, 300)) for view in ("front", "side", "right", "back")}
+
+    def warned(side: str) -> bool:
+        given = {"front": "front", "left": side, "back": "back"}
+        read = read_views({viewpoint(name): pictures[one] for name, one in given.items()}, size=128)
+        return any("--side right" in line for line in read.warnings)
+
+    assert warned("right") and not warned("side")
