@@ -30,7 +30,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("reporting",),
     ("finetuning",),
     ("reconstruction", "training"),
-    ("bench", "doctor", "stability"),
+    ("app", "bench", "doctor", "stability"),
     ("cli", "__init__"),
     ("__main__",),
 )

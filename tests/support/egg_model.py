@@ -36,12 +36,13 @@ class FakeModel:
     """What `reconstruct` asks of a model."""
 
     source = Path("weights.safetensors")
+    image_size = 64
 
     def __init__(self, density: float = 1.0) -> None:
         self.density = density
 
     def encode_drawings(self, drawings, options=None) -> Hero:
-        read = read_views(drawings, size=64, options=options)
+        read = read_views(drawings, size=self.image_size, options=options)
         hull = build_hull(read.views, box_min=BOX[0], box_max=BOX[1], grid_size=32)[0]
 
         def field(points, view_dirs):

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from charnerf.cli import (
+    app,
     bench,
     capture,
     check,
@@ -57,6 +58,7 @@ door = typer.Typer(
 door.command("train", context_settings=train.HYDRA_READS_ALL)(train.command)
 for module in (
     reconstruct,
+    app,
     finetune,
     gallery,
     mesh,

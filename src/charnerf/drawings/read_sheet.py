@@ -70,7 +70,7 @@ def read_sheet(
             f"{drawing.name}: found one figure, expected a sheet with at least two views. Give views one by one: FRONT SIDE"
             " BACK, or --view 0=FRONT --view 90=SIDE."
         )
-    canvases = _canvases(sheet)
+    canvases = canvases_to_name([one.drawing for one in sheet.figures])
     views, doubtful = _views(drawing, canvases, order, figures or {})
     chosen = [(view, index) for index, view in views.items() if view is not None]
     shown = [view.name for view, _ in chosen]
@@ -89,9 +89,12 @@ def read_sheet(
     )
 
 
-def _canvases(sheet: Sheet) -> list[np.ndarray]:
-    """The figures cut out and brought to one height, (CANVAS, CANVAS, 4) each."""
-    drawings = [one.drawing for one in sheet.figures]
+def canvases_to_name(drawings: Sequence[Drawing]) -> list[np.ndarray]:
+    """Figures cut out and brought to one height, (CANVAS, CANVAS, 4) each, as `naming` wants them.
+
+    Raises:
+        DataError: If one can not be cut out.
+    """
     return on_one_scale([cut_out(one).rgba for one in drawings], [one.name for one in drawings], CANVAS)
 
 
@@ -118,7 +121,7 @@ def _views(
             i: None if name == "-" else _named(name, canvases[i], shown) for i, name in enumerate(order)
         }
     elif naming is not None:
-        views |= dict(enumerate(_square(naming.viewpoints)))
+        views |= dict(enumerate(square_views(naming.viewpoints)))
     for name, number in figures.items():
         if not 1 <= number <= count:
             raise DataError(f"--figure {name}={number}: found no such figure, expected 1 to {count}.")
@@ -129,7 +132,7 @@ def _views(
     return views, naming is not None and naming.is_doubtful and not figures
 
 
-def _square(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint | None]:
+def square_views(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint | None]:
     """The viewpoints, without those between them where front, back and a side are there: see `between_square_ones`."""
     left_out = between_square_ones(viewpoints)
     return [None if one in left_out else one for one in viewpoints]

@@ -46,6 +46,8 @@ class Reconstruction:
         turntable: turntable.mp4 or turntable.gif.
         views: PNG files with alpha, by azimuth.
         report: report.html; report.md and report.json lie beside it.
+        hero: The character that the mesh was made of: refined and symmetric where that was asked for.
+        baked: The same, to be looked at often.
         built: The mesh and how it came about.
         quality: What it is worth.
         suggestions: What may make it better.
@@ -58,6 +60,8 @@ class Reconstruction:
     turntable: Path
     views: tuple[Path, ...]
     report: Path
+    hero: Hero
+    baked: Hero
     built: BuiltMesh
     quality: Quality
     suggestions: tuple[str, ...]
@@ -100,9 +104,8 @@ def reconstruct(
         with _timed(seconds, "encode"):
             hero, drawings = _encoded(model, given, reading, say)
         hero, refined = _refined(model, hero, options.refine_seconds, seconds, say, progress)
-        pictures, built = _pictures_and_mesh(
-            hero.symmetric() if options.symmetric else hero, options, seconds, progress
-        )
+        hero = hero.symmetric() if options.symmetric else hero
+        baked, pictures, built = _pictures_and_mesh(hero, options, seconds, progress)
         progress.stage("files")
         with write_folder_aside(output) as folder:
             made = _write(
@@ -112,16 +115,18 @@ def reconstruct(
         say(line)
     for other in {"turntable.mp4", "turntable.gif"} - {made.film.name}:  # of a reconstruction before
         (output / other).unlink(missing_ok=True)
-    return _moved(made, output)
+    return _moved(made, output, hero, baked)
 
 
-def _moved(made: Made, output: Path) -> Reconstruction:
+def _moved(made: Made, output: Path, hero: Hero, baked: Hero) -> Reconstruction:
     """What was made, its files where they lie in the end."""
     return Reconstruction(
         mesh=output / "mesh.glb",
         turntable=output / made.film.name,
         views=tuple(output / "views" / view.name for view in made.views),
         report=output / "report.html",
+        hero=hero,
+        baked=baked,
         built=made.built,
         quality=made.quality,
         suggestions=tuple(made.suggestions),
@@ -175,8 +180,8 @@ def _refined(
 
 def _pictures_and_mesh(
     hero: Hero, options: ReconstructionOptions, seconds: dict[str, float], progress: Progress
-) -> tuple[list[np.ndarray], BuiltMesh]:
-    """Pictures from around, RGBA uint8, and the mesh."""
+) -> tuple[Hero, list[np.ndarray], BuiltMesh]:
+    """The character to be looked at often, pictures of it from around, RGBA uint8, and the mesh."""
     progress.stage("bake")
     with _timed(seconds, "bake"):
         baked = hero.baked()
@@ -189,7 +194,7 @@ def _pictures_and_mesh(
     progress.stage("mesh")
     with _timed(seconds, "mesh"):
         built = hero.build_mesh(options.mesh, on_points=meter(progress, (options.mesh.resolution,)))
-    return pictures, built
+    return baked, pictures, built
 
 
 def _write(

@@ -1,0 +1,353 @@
+"""The page over HTTP: what it asks, what it is sent, and the stream that tells it of every change."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from aiohttp import web
+
+from charnerf.app.examples import EXAMPLES, example_files
+from charnerf.app.guard import HEADERS, refusal
+from charnerf.app.session import Session
+from charnerf.app.settings import form, read_plan
+from charnerf.app.studio import Studio
+from charnerf.app.worker import Refused
+from charnerf.drawings.options import ReadingOptions
+from charnerf.drawings.viewpoints import AZIMUTHS
+from charnerf.errors import CharNeRFError, DataError
+from charnerf.viewer.element import viewer_script
+
+PAGE = {
+    "/": ("charnerf.app", "page/index.html", "text/html"),
+    "/app.js": ("charnerf.app", "page/app.js", "text/javascript"),
+    "/app.css": ("charnerf.app", "page/app.css", "text/css"),
+    "/page.css": ("charnerf.reporting", "page.css", "text/css"),
+}
+MOST_TEXT = 64 * 1024  # bytes of what the page says
+MOST_NAME = 120  # signs of a file's name
+HEARTBEAT = 15.0  # seconds
+LOOKS = range(32, 513)  # pixels a side
+STUDIO: web.AppKey[Studio] = web.AppKey("studio", Studio)
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+def make_app(studio: Studio, names: Collection[str]) -> web.Application:
+    """The server's application.
+
+    Args:
+        studio: What does the work; it is closed with the application.
+        names: Hosts that it is known by, beside numbers.
+    """
+    app = web.Application(middlewares=[_guarded(frozenset(names))], client_max_size=MOST_TEXT)
+    app[STUDIO] = studio
+    for path, (package, name, kind) in PAGE.items():
+        app.router.add_get(path, _sending(files(package).joinpath(name).read_bytes(), kind))
+    app.router.add_get("/viewer.js", _sending(viewer_script().encode(), "text/javascript"))
+    app.router.add_get("/form", _form)
+    app.router.add_get("/examples/{name}", _example_picture)
+    app.router.add_post("/sessions", _open)
+    session = "/sessions/{session}"
+    app.router.add_get(f"{session}/events", _events)
+    app.router.add_post(f"{session}/pictures", _add)
+    app.router.add_delete(f"{session}/pictures/{{number}}", _remove)
+    app.router.add_post(f"{session}/examples/{{name}}", _add_example)
+    app.router.add_post(f"{session}/figures", _edit)
+    app.router.add_post(f"{session}/build", _build)
+    app.router.add_post(f"{session}/cancel", _cancel)
+    app.router.add_get(f"{session}/look", _look)
+    app.router.add_get(f"{session}/pictures/{{number}}", _thumbnail)
+    app.router.add_get(f"{session}/read/{{folder}}/{{name}}", _read_picture)
+    app.router.add_get(f"{session}/made/{{folder}}/{{name}}", _made_file)
+    app.cleanup_ctx.append(_closing)
+    return app
+
+
+async def _closing(app: web.Application) -> AsyncIterator[None]:
+    yield
+    app[STUDIO].close()
+
+
+@asynccontextmanager
+async def serving(
+    studio: Studio, host: str, port: int, names: Collection[str]
+) -> AsyncIterator[tuple[str, int]]:
+    """Serve the page meanwhile.
+
+    Yields:
+        The address and the port it is served at: a free one where the port is 0.
+
+    Raises:
+        OSError: If it can not be served there.
+    """
+    runner = web.AppRunner(
+        make_app(studio, names), handler_cancellation=True, access_log=None, shutdown_timeout=1.0
+    )
+    await runner.setup()
+    try:
+        await web.TCPSite(runner, host, port).start()
+        address = runner.addresses[0]
+        yield str(address[0]), int(address[1])
+    finally:
+        await runner.cleanup()
+
+
+def _guarded(names: Collection[str]) -> Callable[..., Any]:
+    """What stands before every answer: who may ask; errors are a sentence."""
+
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        why = refusal(request.method, request.headers, names)
+        if why is not None:
+            return _problem(403, why)
+        try:
+            return await handler(request)
+        except (CharNeRFError, Refused) as error:
+            return _problem(400, str(error))
+        except web.HTTPRequestEntityTooLarge:
+            return _problem(413, f"found more than {MOST_TEXT} bytes, expected fewer. Load the page again.")
+        except web.HTTPException as error:
+            return _problem(error.status, error.text or error.reason)
+
+    return guard
+
+
+def _problem(status: int, sentence: str) -> web.Response:
+    return web.json_response({"error": sentence}, status=status, headers=HEADERS)
+
+
+def _sending(content: bytes, kind: str) -> Handler:
+    """What sends one of the page's own files."""
+
+    async def send(request: web.Request) -> web.Response:
+        return web.Response(body=content, content_type=kind, charset="utf-8", headers=HEADERS)
+
+    return send
+
+
+async def _form(request: web.Request) -> web.Response:
+    limits = request.app[STUDIO].limits
+    content = {
+        "fields": form(),
+        "views": list(AZIMUTHS),
+        "examples": {name: one.title for name, one in EXAMPLES.items()},
+        "limits": {"upload": limits.upload, "pictures": limits.pictures},
+    }
+    return web.json_response(content, headers=HEADERS)
+
+
+async def _example_picture(request: web.Request) -> web.StreamResponse:
+    name = request.match_info["name"]
+    if name not in EXAMPLES:
+        raise web.HTTPNotFound(text="There is no such example.")
+    return web.FileResponse(example_files(name)[0], headers=HEADERS)
+
+
+async def _open(request: web.Request) -> web.Response:
+    return web.json_response({"session": request.app[STUDIO].open().name}, headers=HEADERS)
+
+
+def _session(request: web.Request) -> Session:
+    session = request.app[STUDIO].sessions.get(request.match_info["session"])
+    if session is None:
+        raise web.HTTPNotFound(
+            text="This page's work is not there any more. Load the page again to begin anew."
+        )
+    return session
+
+
+async def _events(request: web.Request) -> web.StreamResponse:
+    """All that the page shows, again whenever it has changed; that it is read says that the page is open."""
+    studio, session = request.app[STUDIO], _session(request)
+    response = web.StreamResponse(headers={**HEADERS, "Content-Type": "text/event-stream"})
+    changed = asyncio.Event()
+    session.listeners.add(changed)
+    studio.came(session)
+    try:
+        await response.prepare(request)
+        while session.name in studio.sessions:
+            changed.clear()
+            state = json.dumps(session.state(studio.queue.place(session)))
+            await response.write(f"data: {state}\n\n".encode())
+            while not await _is_set(changed, HEARTBEAT):
+                await response.write(b": still there\n\n")
+    except ConnectionError:
+        pass  # the page is closed
+    finally:
+        session.listeners.discard(changed)
+        studio.left(session)
+    return response
+
+
+async def _is_set(event: asyncio.Event, seconds: float) -> bool:
+    """Whether an event is set within a time."""
+    try:
+        await asyncio.wait_for(event.wait(), seconds)
+    except TimeoutError:
+        return False
+    return True
+
+
+async def _add(request: web.Request) -> web.Response:
+    """A picture, as the request's whole body."""
+    studio, session = request.app[STUDIO], _session(request)
+    title = _title(request.query.get("name", ""))
+    too_large = DataError(
+        f"{title}: found more than {studio.limits.upload // 2**20} MiB, expected fewer. Save it smaller, as PNG or JPEG."
+    )
+    if (request.content_length or 0) > studio.limits.upload:
+        raise too_large
+    file = studio.reader.new_picture(session, title)
+    try:
+        size = 0
+        with file.open("wb") as stream:
+            async for piece in request.content.iter_chunked(2**16):
+                size += len(piece)
+                if size > studio.limits.upload:
+                    raise too_large
+                stream.write(piece)
+    except BaseException:
+        file.unlink(missing_ok=True)
+        file.parent.rmdir()
+        raise
+    await studio.reader.add_picture(session, file, more="more" in request.query)
+    return _done()
+
+
+def _title(name: str) -> str:
+    """A file's name that is one, and nothing else: no path, no hidden file, nothing that can not be printed."""
+    name = "".join(sign for sign in name.replace("\\", "/").rpartition("/")[2] if sign.isprintable())
+    name = name.lstrip(". ")
+    while len(name.encode("utf-8", "ignore")) > MOST_NAME:
+        name = name[:-1]
+    return name.encode("utf-8", "ignore").decode() or "drawing"
+
+
+async def _add_example(request: web.Request) -> web.Response:
+    studio, session, name = request.app[STUDIO], _session(request), request.match_info["name"]
+    if name not in EXAMPLES:
+        raise web.HTTPNotFound(text="There is no such example.")
+    for picture in list(session.pictures):
+        studio.reader.remove_picture(session, picture.number)
+    pictures = example_files(name)
+    for index, picture_file in enumerate(pictures):
+        file = studio.reader.new_picture(session, picture_file.name)
+        file.write_bytes(picture_file.read_bytes())
+        await studio.reader.add_picture(session, file, more=index + 1 < len(pictures))
+    return _done()
+
+
+async def _remove(request: web.Request) -> web.Response:
+    request.app[STUDIO].reader.remove_picture(_session(request), _number(request.match_info["number"]))
+    return _done()
+
+
+async def _edit(request: web.Request) -> web.Response:
+    """Names, left-out and mirrored figures; how drawings are read."""
+    session, said = _session(request), await _said(request)
+    changes, reading = said.get("figures", {}), said.get("reading")
+    if not isinstance(changes, dict) or not all(
+        isinstance(one, dict) and isinstance(one.get("view"), str) and isinstance(one.get("mirrored"), bool)
+        for one in changes.values()
+    ):
+        raise DataError(
+            "figures: found something else, expected view and mirrored by number. Load the page again."
+        )
+    if reading is not None:
+        reading = read_plan(reading).reading
+    read: ReadingOptions | None = reading
+    request.app[STUDIO].reader.edit(
+        session, {_number(number): (one["view"], one["mirrored"]) for number, one in changes.items()}, read
+    )
+    return _done()
+
+
+async def _build(request: web.Request) -> web.Response:
+    request.app[STUDIO].queue.build(_session(request), read_plan(await _said(request)))
+    return _done()
+
+
+async def _cancel(request: web.Request) -> web.Response:
+    request.app[STUDIO].queue.cancel(_session(request))
+    return _done()
+
+
+async def _look(request: web.Request) -> web.Response:
+    session = _session(request)
+    try:
+        azimuth, elevation = float(request.query["azimuth"]), float(request.query["elevation"])
+        size = int(request.query["size"])
+    except (KeyError, ValueError) as error:
+        raise DataError(
+            "look: expected azimuth, elevation and size as numbers. Load the page again."
+        ) from error
+    if size not in LOOKS or not abs(azimuth) <= 720.0 or not abs(elevation) <= 90.0:
+        raise DataError(
+            f"look: found {azimuth}, {elevation}, {size}, expected angles and a size. Load the page again."
+        )
+    picture = await request.app[STUDIO].queue.look(
+        session, azimuth_deg=azimuth, elevation_deg=elevation, size=size
+    )
+    return web.Response(body=picture, content_type="image/png", headers=HEADERS)
+
+
+async def _thumbnail(request: web.Request) -> web.StreamResponse:
+    session, number = _session(request), _number(request.match_info["number"])
+    for picture in session.pictures:
+        if picture.number == number:
+            return _file(picture.thumbnail)
+    raise web.HTTPNotFound(text="This picture is not there any more.")
+
+
+async def _read_picture(request: web.Request) -> web.StreamResponse:
+    """A picture of how a view was read."""
+    session, name = _session(request), request.match_info["name"]
+    read = () if session.recognized is None else session.recognized.views
+    known = {file for one in read for file in (one.given, one.mended) if file is not None}
+    return _file(_known(session.recognized_in, request.match_info["folder"], name, known))
+
+
+async def _made_file(request: web.Request) -> web.StreamResponse:
+    """A file of what was made; `?save` saves it."""
+    session, name = _session(request), request.match_info["name"]
+    product = session.product
+    known = set() if product is None else {*product.files, *(level.file for level in product.levels)}
+    file = _known(session.made_in, request.match_info["folder"], name, known)
+    return _file(
+        file, {"Content-Disposition": f'attachment; filename="{name}"'} if "save" in request.query else {}
+    )
+
+
+def _known(folder: Path | None, folder_name: str, name: str, known: Collection[str]) -> Path:
+    """A file that was told of, and no other."""
+    if folder is None or folder.name != folder_name or name not in known or not (folder / name).is_file():
+        raise web.HTTPNotFound(text="This file is not there any more.")
+    return folder / name
+
+
+def _file(path: Path, headers: dict[str, str] | None = None) -> web.FileResponse:
+    return web.FileResponse(path, headers={**HEADERS, **(headers or {})})
+
+
+def _done() -> web.Response:
+    return web.json_response({}, headers=HEADERS)
+
+
+def _number(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise web.HTTPNotFound(text="There is no such picture.")
+    return int(text)
+
+
+async def _said(request: web.Request) -> dict[str, Any]:
+    """What the page says, an object of JSON."""
+    try:
+        said = await request.json()
+    except (ValueError, RecursionError) as error:
+        raise DataError("found no JSON, expected an object. Load the page again.") from error
+    if not isinstance(said, dict):
+        raise DataError("found no object of JSON, expected one. Load the page again.")
+    return said
