@@ -15,7 +15,7 @@ from multiprocessing.context import BaseContext
 from typing import Any, final
 
 from charnerf.errors import CharNeRFError
-from charnerf.interruption import leave_signals_to_parent
+from charnerf.interruption import end_with_parent, leave_signals_to_parent
 from charnerf.progress import Moment, reported_to
 
 TELL_EVERY = 0.2  # seconds between two moments of one stage
@@ -95,6 +95,7 @@ class Worker:
 def _answer(connection: Connection, make: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """The side that answers, until the other one is gone."""
     leave_signals_to_parent()
+    end_with_parent()  # a pipe that other processes hold too would not tell
     made = None
     while True:
         try:
