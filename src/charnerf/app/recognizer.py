@@ -10,13 +10,13 @@ import numpy as np
 from PIL import Image
 
 from charnerf.app.answers import Found, Recognized, RecognizedView
-from charnerf.app.figures import SIDES, Figure, in_order, view_by_name, view_text
+from charnerf.app.figures import Figure, in_order, view_by_name, view_text
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import Drawing, load_drawing
-from charnerf.drawings.naming import MOST_NAMED, looks_left, name_views
+from charnerf.drawings.naming import MOST_NAMED, name_views
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.picture import CAPTION, PANEL
-from charnerf.drawings.read_sheet import canvases_to_name, square_views
+from charnerf.drawings.read_sheet import canvases_to_name, named_view, square_views
 from charnerf.drawings.sheet import Sheet, find_figures
 from charnerf.drawings.turnaround import LEAST_AGREEMENT, Picture, Turnaround, read_views
 from charnerf.drawings.viewpoints import Viewpoint, viewpoint
@@ -70,9 +70,10 @@ class Recognizer:
         """
         canvases = canvases_to_name([_drawing(one) for one in figures])
         told = [view_by_name(one.title) if one.part is None else None for one in figures]
-        side = [view_text(viewpoint("left" if looks_left(canvas) else "right")) for canvas in canvases]
-        named: list[str | None] = [
-            looks if name in SIDES else name for name, looks in zip(told, side, strict=True)
+        shown = {name: canvas for name, canvas in zip(told, canvases, strict=True) if name is not None}
+        named = [
+            None if name is None else view_text(named_view(name, canvas, shown))
+            for name, canvas in zip(told, canvases, strict=True)
         ]
         if None in named and 2 <= len(figures) <= MOST_NAMED:
             seen = [view_text(view) for view in square_views(name_views(canvases).viewpoints)]

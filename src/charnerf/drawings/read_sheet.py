@@ -118,7 +118,7 @@ def _views(
     if order:
         shown = {name: canvases[i] for i, name in enumerate(order)}
         views |= {
-            i: None if name == "-" else _named(name, canvases[i], shown) for i, name in enumerate(order)
+            i: None if name == "-" else named_view(name, canvases[i], shown) for i, name in enumerate(order)
         }
     elif naming is not None:
         views |= dict(enumerate(square_views(naming.viewpoints)))
@@ -126,7 +126,7 @@ def _views(
         if not 1 <= number <= count:
             raise DataError(f"--figure {name}={number}: found no such figure, expected 1 to {count}.")
         shown = {view.name: canvases[i] for i, view in views.items() if view is not None}
-        wanted = _named(name, canvases[number - 1], shown)
+        wanted = named_view(name, canvases[number - 1], shown)
         views |= {i: None for i, view in views.items() if view == wanted}
         views[number - 1] = wanted
     return views, naming is not None and naming.is_doubtful and not figures
@@ -138,7 +138,7 @@ def square_views(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint | None]:
     return [None if one in left_out else one for one in viewpoints]
 
 
-def _named(name: str, canvas: np.ndarray, shown: Mapping[str, np.ndarray]) -> Viewpoint:
+def named_view(name: str, canvas: np.ndarray, shown: Mapping[str, np.ndarray]) -> Viewpoint:
     """A viewpoint by its name; `side` looks whichever way the figure does, by the front and back that are shown."""
     if name != "side":
         return viewpoint(name)
