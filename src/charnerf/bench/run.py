@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from charnerf.bench.headline import headline
+from charnerf.bench.levels import characters_of, drawn_levels
 from charnerf.bench.plots import plot_work_precision
 from charnerf.bench.subjects import NUM_CHARACTERS, NUM_PIXELS, Subject, embedded, of_dataset, prepared
 from charnerf.bench.sweep import sample_methods, sweep
 from charnerf.bench.tables import comparison_table, headline_table, rows_table
-from charnerf.bench.workbench import Workbench, workbench
+from charnerf.bench.workbench import CULLED, Workbench, workbench
 from charnerf.evaluation.environment import environment
 from charnerf.inference.model import Model
 from charnerf.wording import counted
@@ -35,12 +37,13 @@ def run(
         model: The trained model.
         data: Data set of the characters; embedded ones if None.
         split: Of the data set.
-        quick: Leave out the sweep of samples and tolerances.
+        quick: Leave out the sweep of samples and tolerances, and the levels of drawings.
         output: Folder that gets the sweep's diagram; none is drawn if None.
         say: Gets a line at every stage, with seconds.
 
     Returns:
-        The headline and what it summarises, "samples" (rows of the sweep), environment, weights, data.
+        The headline and what it summarises, "samples" (rows of the sweep), "levels" (rows by how far drawings
+        disagree), environment, weights, data.
     """
     start = time.perf_counter()
 
@@ -58,8 +61,9 @@ def run(
     announce("rendering and training steps")
     result = headline(bench, subjects)
     if not quick:
-        announce("samples a ray and tolerances")
+        announce("samples a ray, tolerances, levels of drawings that disagree")
         result["samples"] = _sweep_samples(bench, subjects, output)
+        result["levels"] = _levels(bench, data, split)
     announce("done")
     return {
         **result,
@@ -81,11 +85,18 @@ def _sweep_samples(
     return [vars(row) for row in rows]
 
 
+def _levels(bench: Workbench, data: Path | None, split: str) -> list[dict[str, Any]]:
+    """Rows of the levels of drawings, by the renderer that pictures are made with by default."""
+    with tempfile.TemporaryDirectory() as folder:
+        characters = characters_of(data, split, NUM_CHARACTERS, folder=Path(folder), size=bench.image_size)
+        return drawn_levels(bench.network, bench.renderers[CULLED], characters)
+
+
 def summary(result: dict[str, Any]) -> str:
     """The main tables of a run as text."""
     machine = result["environment"]
     tables = [headline_table(result["headline"]), comparison_table(result["characters"])]
     if "samples" in result:
-        tables.append(rows_table(result["samples"]))
+        tables += [rows_table(result["samples"]), rows_table(result["levels"])]
     where = f"{machine['machine']}, {counted(machine['threads'], 'thread')}, torch {machine['torch']}, {machine['device']}"
     return "\n\n".join([*tables, where])

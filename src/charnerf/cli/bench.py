@@ -18,7 +18,10 @@ def command(
     weights: Weights = None,
     *,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Leave out the sweep of samples and tolerances.")
+        bool,
+        typer.Option(
+            "--quick", help="Leave out the sweep of samples and tolerances, and the levels of drawings."
+        ),
     ] = False,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", file_okay=False, help="For the sweep's diagram.")
