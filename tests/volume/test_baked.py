@@ -11,7 +11,7 @@ from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.scene import FunctionField, Scene
 from charnerf.types import FieldOutput, RayBundle, Rendering
-from charnerf.volume.baking.bake import bake
+from charnerf.volume.baking.bake import Baked, bake
 from charnerf.volume.baking.field import BakedField
 from charnerf.volume.baking.march import Seen
 from charnerf.volume.quadrature import PiecewiseConstant
@@ -110,33 +110,46 @@ def test_homogeneous_bodies_have_their_analytic_opacity(name):
     assert float(off.mean()) <= 0.01
 
 
-@pytest.mark.parametrize(
-    ("density", "order", "spread"),
-    [
-        (lambda points: 8.0 * torch.exp(-((around(points) / 0.25) ** 2)), 2.0, 0.4),
-        (lambda points: DENSITY * (around(points) < RADIUS).float(), 1.0, 0.5),
-    ],
-    ids=["smooth", "a jump"],
-)
-def test_the_error_falls_with_the_step(density, order, spread):
-    """Quadratically on smooth densities, linearly where they jump."""
+SMOOTH = lambda points: 8.0 * torch.exp(-((around(points) / 0.25) ** 2))  # noqa: E731
+
+
+def opacity_errors(density, pitches: tuple[float, ...], tolerance: float) -> tuple[list[float], list[Baked]]:
+    """Root mean squares of a density's errors by grids of some pitches, and the grids."""
     rays, scene = rays_of(20), scene_of(density)
-    fine = CulledRenderer(**{**COMMON, "num_coarse": 4096})
-    renderer, errors, steps = baked(1e-3), [], []
+    renderer, errors, grids = baked(tolerance), [], []
     with torch.no_grad():
-        reference = fine.render(scene, rays).finest.opacity
-        for pitch in (0.16, 0.08, 0.04):
+        reference = CulledRenderer(**{**COMMON, "num_coarse": 4096}).render(scene, rays).finest.opacity
+        for pitch in pitches:
 
             class Coarse(type(scene.coarse)):
                 def lattice(self, low, high, pitch=pitch):
                     return low, pitch
 
-            grid = bake(replace(scene, coarse=Coarse(scene.coarse.function)), tolerance=1e-3, memory_mib=256)
-            found = renderer.render(Scene(BakedField(grid, None, scene.coarse), None, scene.bounds), rays)
-            errors.append(float((found.finest.opacity - reference).square().mean().sqrt()))
-            steps.append(grid.grid.step)
-    slope = math.log(errors[0] / errors[-1]) / math.log(steps[0] / steps[-1])
+            coarse = replace(scene, coarse=Coarse(scene.coarse.function))
+            grids.append(bake(coarse, tolerance=tolerance, memory_mib=256))
+            looked_at = Scene(BakedField(grids[-1], None, scene.coarse), None, scene.bounds)
+            found = renderer.render(looked_at, rays).finest.opacity
+            errors.append(float((found - reference).square().mean().sqrt()))
+    return errors, grids
+
+
+@pytest.mark.parametrize(
+    ("density", "order", "spread"),
+    [(SMOOTH, 2.0, 0.4), (lambda points: DENSITY * (around(points) < RADIUS).float(), 1.0, 0.5)],
+    ids=["smooth", "a jump"],
+)
+def test_the_error_falls_with_the_step(density, order, spread):
+    """Quadratically on smooth densities, linearly where they jump; by a tolerance so small that the step alone decides."""
+    errors, grids = opacity_errors(density, (0.16, 0.08, 0.04), 1e-5)
+    slope = math.log(errors[0] / errors[-1]) / math.log(grids[0].grid.step / grids[-1].grid.step)
     assert slope == pytest.approx(order, abs=spread)
+
+
+def test_straight_densities_are_not_asked_where_the_tolerance_allows():
+    (few_error,), (few,) = opacity_errors(SMOOTH, (0.04,), 1e-3)
+    (all_error,), (every,) = opacity_errors(SMOOTH, (0.04,), 1e-5)
+    assert few.num_densities < 0.5 * every.num_densities
+    assert all_error < few_error < 1e-3
 
 
 def test_a_trained_kind_of_field_is_within_the_tolerance():
@@ -184,6 +197,18 @@ def test_a_grid_that_does_not_fit_is_coarser_and_says_so(caplog):
         made = bake(scene, tolerance=0.05, memory_mib=6)
     assert made.coarser > 1 and made.grid.mib <= 6
     assert "as coarse" in caplog.text and "renderer.memory_mib=6 is less" in caplog.text
+
+
+def test_the_share_of_the_work_grows_to_all_of_it_and_may_end_it():
+    shares: list[float] = []
+    bake(scene_of(SMOOTH), tolerance=0.05, memory_mib=256, on_share=shares.append)
+    assert len(shares) >= 2 and shares == sorted(shares) and 0.0 < shares[0] < 0.5 and shares[-1] == 1.0
+
+    def stop(share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bake(scene_of(SMOOTH), tolerance=0.05, memory_mib=256, on_share=stop)
 
 
 def test_nothing_is_seen_of_nothing_and_what_is_dark_or_empty_is_not_asked():

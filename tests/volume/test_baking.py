@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from charnerf.geometry.cameras import pixel_lattice, project_into_all
-from charnerf.volume.baking.bake import _without_bias
+from charnerf.volume.baking.bake import _expected_errors, _without_bias
 from charnerf.volume.baking.directions import polynomials, projection, sampled_directions
 from charnerf.volume.baking.grid import EMPTY_U, combined, densities_from_u, interpolated, u_from_densities
 from charnerf.volume.baking.lattice import corners_of, finer_points, gaps, light_depths
@@ -125,3 +125,14 @@ def test_curved_values_are_right_in_the_mean_between_points():
         torch.testing.assert_close(_without_bias(bent, index, places, 2), bent)
         jump = torch.where(along > 2, 1.0, EMPTY_U).double()
         torch.testing.assert_close(_without_bias(jump, index, places, 2), jump)
+
+
+def test_the_expected_error_is_that_of_straight_lines_through_a_curve():
+    """Of u = x^2 lines between points one apart are an eighth of its second derivative off, halfway; of straight u nothing is."""
+    x = torch.arange(6, dtype=torch.float64)[:, None, None].expand(6, 5, 4) - 2.0
+    all_of_it = torch.ones_like(x)
+    found = _expected_errors(x.square(), all_of_it)[1:-1]
+    between = densities_from_u(x.square() + 0.25) - densities_from_u(x.square())
+    torch.testing.assert_close(found, between[1:-1], rtol=0.1, atol=0)
+    assert bool((_expected_errors(3.0 * x, all_of_it) == 0.0).all())
+    torch.testing.assert_close(_expected_errors(x.square(), 0.5 * all_of_it)[1:-1], 0.5 * found)

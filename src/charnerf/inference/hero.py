@@ -114,11 +114,15 @@ class Hero:
         """The character as its own mirror image: densities averaged over left and right, for meshes and views."""
         return replace(self, scene=symmetric_scene(self.scene))
 
-    def baked(self, tolerance: float = TOLERANCE) -> Hero:
+    def baked(
+        self, tolerance: float = TOLERANCE, *, on_share: Callable[[float], object] = lambda share: None
+    ) -> Hero:
         """The character evaluated once on a grid, for many views of it: see `renderer=baked`; as it is where it can not be.
 
         Args:
             tolerance: Error of a colour that is aimed at, in [0, 1]; 0 leaves it as it is.
+            on_share: Called again and again with the share of the work that is done, in [0, 1], such as `progress.update`; what it
+                raises ends the work.
 
         Raises:
             ConfigError: If the tolerance is negative or not finite.
@@ -126,7 +130,7 @@ class Hero:
         if not 0.0 <= tolerance < math.inf:
             raise ConfigError(f"tolerance: found {tolerance}, expected a number from 0 on.")
         renderer = BakedRenderer(**self.renderer.settings, tolerance=tolerance)
-        return replace(self, scene=renderer.prepared(self.scene), renderer=renderer)
+        return replace(self, scene=renderer.prepared(self.scene, on_share), renderer=renderer)
 
     def lods(
         self,

@@ -184,7 +184,7 @@ def _pictures_and_mesh(
     """The character to be looked at often, pictures of it from around, RGBA uint8, and the mesh."""
     progress.stage("bake")
     with _timed(seconds, "bake"):
-        baked = hero.baked()
+        baked = hero.baked(on_share=progress.update)
         if options.bake is not None:
             save_baked(options.bake, baked)
     progress.stage("pictures")

@@ -6,6 +6,7 @@ Letters: P points, K directions, C values that a colour is made of.
 import logging
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -23,6 +24,7 @@ from charnerf.volume.baking.grid import (
     EMPTY_U,
     OPAQUE,
     OPAQUE_U,
+    SCALE,
     BakedGrid,
     combined,
     cut_densities,
@@ -39,14 +41,19 @@ from charnerf.volume.baking.lattice import (
 )
 from charnerf.volume.marching import points_at_once
 
+OnShare = Callable[[float], object]
+
 log = logging.getLogger(__name__)
 
 FACTOR = 2  # steps of the fine grid in one of the lattice
 UNSEEN_SHARE = 0.1  # of the tolerance: light that is followed no further
 FAINT_SHARE = 0.1  # of the tolerance: opacity of a metre of what counts as empty
-THIN_SHARE = 0.2  # of the tolerance: opacity of a cell that is not refined
+THIN_SHARE = 0.2  # of the tolerance: opacity of a cell that has no colours and is not refined
+STRAIGHT_SHARE = 0.08  # of the tolerance: expected error of a step's opacity in a cell that is not refined
 LEAST_POINTS = 16  # of the lattice along its longest side, however little memory there is
 TYPICAL_VALUES = 8  # that a colour is made of, for the estimate of memory
+COLOR_COST = 6  # times that of a density, in the usual case; for the share of the work that is done
+LATTICE_PART = 0.1  # of all work, in the usual case
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,14 @@ class Baked:
 
 
 @torch.no_grad()
-def bake(scene: Scene, *, tolerance: float, memory_mib: float, factor: int = FACTOR) -> Baked:
+def bake(
+    scene: Scene,
+    *,
+    tolerance: float,
+    memory_mib: float,
+    factor: int = FACTOR,
+    on_share: OnShare = lambda share: None,
+) -> Baked:
     """Evaluate a scene's finest field on a grid; its density must not see the direction.
 
     Args:
@@ -79,27 +93,15 @@ def bake(scene: Scene, *, tolerance: float, memory_mib: float, factor: int = FAC
         tolerance: Error of a colour that pictures may have; decides what is too faint or too dark to be evaluated.
         memory_mib: What the grid may take, MiB: it is made coarser where it would take more, and that is logged.
         factor: Steps of the grid in one of the field's lattice.
+        on_share: Called again and again with the share of the work that is done, in [0, 1]; what it raises ends the work.
     """
     start = time.perf_counter()
-    coarser, asked = 1, 0
-    while True:
-        coarse = _Coarse.of(scene, tolerance, coarser)
-        asked += coarse.num_evaluated
-        taken = coarse.mib(factor, scene.field.coloring is not None)
-        if taken <= memory_mib or max(coarse.lattice.shape) <= LEAST_POINTS:
-            break
-        coarser += 1
-        log.warning(
-            "renderer=baked: a grid in steps of %.1f mm takes %.0f MiB, renderer.memory_mib=%.0f is less: made %d times as coarse.",
-            1000.0 * coarse.lattice.pitch / factor,
-            taken,
-            memory_mib,
-            coarser,
-        )
+    coarse, coarser, asked = _fitting(scene, tolerance, memory_mib, factor, on_share)
     lattice = coarse.lattice
-    fine = _Fine.of(scene, coarse, factor)
+    on_points = _counter(on_share, LATTICE_PART, 1.0, coarse.num_left(factor))
+    fine = _Fine.of(scene, coarse, factor, on_points)
     beyond = finer_points(any_corner(coarse.dark) & ~coarse.holding, factor) & (fine.index == EMPTY)
-    color_index, color_rows = _colors(scene, coarse)
+    color_index, color_rows = _colors(scene, coarse, on_points)
     low, high = scene.bounds.tight_box
     grid = BakedGrid(
         low=low,
@@ -113,6 +115,7 @@ def bake(scene: Scene, *, tolerance: float, memory_mib: float, factor: int = FAC
         color_rows=color_rows,
         gaps=gaps(coarse.holding),
     )
+    on_share(1.0)
     return Baked(
         grid=grid,
         coarser=coarser,
@@ -121,6 +124,27 @@ def bake(scene: Scene, *, tolerance: float, memory_mib: float, factor: int = FAC
         num_points=fine.index.numel(),
         seconds=time.perf_counter() - start,
     )
+
+
+def _fitting(
+    scene: Scene, tolerance: float, memory_mib: float, factor: int, on_share: OnShare
+) -> tuple["_Coarse", int, int]:
+    """A scene on the finest lattice whose grid fits into a memory, times that it is as coarse as the field's, and points asked."""
+    coarser, asked = 1, 0
+    while True:
+        coarse = _Coarse.of(scene, tolerance, coarser, factor, on_share)
+        asked += coarse.num_evaluated
+        taken = coarse.mib(factor, scene.field.coloring is not None)
+        if taken <= memory_mib or max(coarse.lattice.shape) <= LEAST_POINTS:
+            return coarse, coarser, asked
+        coarser += 1
+        log.warning(
+            "renderer=baked: a grid in steps of %.1f mm takes %.0f MiB, renderer.memory_mib=%.0f is less: made %d times as coarse.",
+            1000.0 * coarse.lattice.pitch / factor,
+            taken,
+            memory_mib,
+            coarser,
+        )
 
 
 @dataclass(frozen=True)
@@ -132,8 +156,10 @@ class _Coarse:
         u: Of its points' densities before they are cut, (X, Y, Z).
         kept: The share of them that is left, (X, Y, Z).
         dark: Which points no light reaches, (X, Y, Z) bool.
+        errors: Of densities halfway between the points, 1/m, expected, (X, Y, Z).
         holding: Which cells hold something that light reaches, (X - 1, Y - 1, Z - 1) bool.
         refined: Which of them hold so much that it is worth to be known better.
+        bent: Which of these hold densities that lie so far off straight lines between the points that they are asked for.
         num_evaluated: Points that the field was asked for.
     """
 
@@ -141,28 +167,37 @@ class _Coarse:
     u: Tensor
     kept: Tensor
     dark: Tensor
+    errors: Tensor
     holding: Tensor
     refined: Tensor
+    bent: Tensor
     num_evaluated: int
 
     @classmethod
-    def of(cls, scene: Scene, tolerance: float, coarser: int) -> "_Coarse":
-        """Evaluate a scene on a lattice so many times as coarse as its field's own."""
+    def of(cls, scene: Scene, tolerance: float, coarser: int, factor: int, on_share: OnShare) -> "_Coarse":
+        """Evaluate a scene on a lattice so many times as coarse as its field's own, to be divided by a factor."""
         lattice = Lattice.of(scene, coarser)
         around = corners_of(any_corner(lattice.held(scene)))
         u = lattice.origin.new_full(lattice.shape, EMPTY_U)
         kept = torch.zeros_like(u)
-        u[around], kept[around] = _asked(scene, lattice.points(around.nonzero()))
+        points = lattice.points(around.nonzero())
+        u[around], kept[around] = _asked(scene, points, _counter(on_share, 0.0, LATTICE_PART, len(points)))
         densities = cut_densities(u, kept)
         dark = light_depths(densities, lattice.pitch) > -math.log(UNSEEN_SHARE * tolerance)
         holding = any_corner(densities > FAINT_SHARE * tolerance) & any_corner(~dark)
         refined = holding & any_corner(densities > THIN_SHARE * tolerance / lattice.pitch)
-        return cls(lattice, u, kept, dark, holding, refined, int(around.sum()))
+        errors, step = _expected_errors(u, kept), lattice.pitch / factor
+        bent = any_corner(errors * step * torch.exp(-densities * step) > STRAIGHT_SHARE * tolerance) & refined
+        return cls(lattice, u, kept, dark, errors, holding, refined, bent, len(points))
 
     @property
     def densities(self) -> Tensor:
         """Of its points, (X, Y, Z), 1/m."""
         return cut_densities(self.u, self.kept)
+
+    def num_left(self, factor: int) -> int:
+        """Points of which densities are still to be asked for, about, and colours for what they cost."""
+        return int(finer_points(self.bent, factor).sum()) + COLOR_COST * int(corners_of(self.refined).sum())
 
     def mib(self, factor: int, has_colors: bool) -> float:
         """What its grid takes, about, MiB."""
@@ -172,14 +207,41 @@ class _Coarse:
         return 4.0 * (indices + 3 * points + colors) / 2**20
 
 
-def _asked(scene: Scene, points: Tensor) -> tuple[Tensor, Tensor]:
+def _counter(on_share: OnShare, low: float, high: float, total: int) -> Callable[[int], None]:
+    """What is called with numbers of points and tells the share of all work, which goes from low to high with their total."""
+    done = 0
+
+    def count(number: int) -> None:
+        nonlocal done
+        done += number
+        on_share(low + (high - low) * min(1.0, done / max(1, total)))
+
+    return count
+
+
+def _asked(scene: Scene, points: Tensor, on_points: Callable[[int], None]) -> tuple[Tensor, Tensor]:
     """Values u (P,) of points (P, 3) and the share (P,) of the density that drawings and hull leave, chunk by chunk."""
     us, shares = [points.new_zeros(0)], [points.new_zeros(0)]
     for some in points.split(points_at_once(scene.field)):
         densities, share = scene.field.uncut_densities(some)
         us.append(u_from_densities(densities))
         shares.append(share * scene.bounds.may_hold(some))
+        on_points(len(some))
     return torch.cat(us), torch.cat(shares)
+
+
+def _expected_errors(u: Tensor, kept: Tensor) -> Tensor:
+    """Errors of densities halfway between points (X, Y, Z) of a lattice, 1/m: a second difference's eighth, of the worst axis.
+
+    It is too large where what is interpolated bends at the points themselves, as most of what is read of drawings does.
+    """
+    curve = torch.zeros_like(u)
+    for axis in range(3):
+        size = u.shape[axis] - 2
+        middle, ends = u.narrow(axis, 1, size), u.narrow(axis, 0, size) + u.narrow(axis, 2, size)
+        inner = curve.narrow(axis, 1, size)
+        torch.maximum(inner, (2.0 * middle - ends).abs(), out=inner)
+    return curve / 8.0 * SCALE * torch.sigmoid(u) * kept.clamp_max(1.0)
 
 
 @dataclass(frozen=True)
@@ -191,26 +253,29 @@ class _Fine:
     num_evaluated: int
 
     @classmethod
-    def of(cls, scene: Scene, coarse: _Coarse, factor: int) -> "_Fine":
-        """Evaluate the points of refined cells that are not on the lattice; interpolate those of others.
+    def of(cls, scene: Scene, coarse: _Coarse, factor: int, on_points: Callable[[int], None]) -> "_Fine":
+        """Evaluate the points of bent cells that are not on the lattice; interpolate those of others.
 
-        The error of a density is that of the lattice, which the new points show, over the square of the factor.
+        The error of a density is that of the lattice, which the new points show, over the square of the factor; where none were
+        asked for it is the expected one.
         """
         lattice, used = coarse.lattice, finer_points(coarse.holding, factor)
         places = used.nonzero()
         index = used.int()
         index[used] = torch.arange(2, len(places) + 2, dtype=torch.int32, device=index.device)
-        rows = torch.stack((coarse.u.reshape(-1), coarse.kept.reshape(-1)), dim=-1)
+        rows = torch.stack([one.reshape(-1) for one in (coarse.u, coarse.kept, coarse.errors)], dim=-1)
         numbers = torch.arange(len(rows), dtype=torch.int32, device=index.device).view(lattice.shape)
-        between = interpolated(numbers, rows, places.to(rows.dtype) / factor)
-        new = finer_points(coarse.refined, factor)[used] & (places % factor != 0).any(-1)
-        found = torch.stack(_asked(scene, lattice.points(places[new], factor)), dim=-1)
-        filled = between.index_put((new,), found)
-        off = (cut_densities(filled[:, 0], filled[:, 1]) - cut_densities(between[:, 0], between[:, 1])).abs()
+        filled = interpolated(numbers, rows, places.to(rows.dtype) / factor)
+        between = (places % factor != 0).any(-1)
+        filled[~between, 2] = 0.0
+        new = finer_points(coarse.bent, factor)[used] & between
+        us, shares = _asked(scene, lattice.points(places[new], factor), on_points)
+        off = (cut_densities(us, shares) - cut_densities(filled[new, 0], filled[new, 1])).abs()
+        filled[new] = torch.stack((us, shares, off / factor**2), dim=-1)
         filled[:, 0] = _without_bias(filled[:, 0], index, places, factor)
         fixed = rows.new_tensor(((EMPTY_U, 0.0, 0.0), (OPAQUE_U, 1.0, 0.0)))
-        filled = torch.cat((fixed, torch.cat((filled, off[:, None] / factor**2), dim=-1)))
-        return cls(index, filled, len(found))
+        filled = torch.cat((fixed, filled))
+        return cls(index, filled, len(us))
 
 
 def _without_bias(u: Tensor, index: Tensor, places: Tensor, factor: int) -> Tensor:
@@ -239,7 +304,7 @@ def _without_bias(u: Tensor, index: Tensor, places: Tensor, factor: int) -> Tens
     return moved
 
 
-def _colors(scene: Scene, coarse: _Coarse) -> tuple[Tensor, Tensor]:
+def _colors(scene: Scene, coarse: _Coarse, on_points: Callable[[int], None]) -> tuple[Tensor, Tensor]:
     """Index and rows of the colours of the corners of refined cells; none where the field has no coloring."""
     wanted, field, coloring = corners_of(coarse.refined), scene.field, scene.field.coloring
     if coloring is None or not bool(wanted.any()):
@@ -256,15 +321,21 @@ def _colors(scene: Scene, coarse: _Coarse) -> tuple[Tensor, Tensor]:
         fitted = torch.einsum("kb,pbc->pkc", back, coefficients)
         off = (coloring.rgb_of(some, parts) - coloring.rgb_of(some, fitted)).abs().amax(-1)
         rows.append(torch.cat((coefficients.flatten(1), off.square().mean(-1, keepdim=True).sqrt()), dim=-1))
+        on_points(COLOR_COST * len(some))
     filled = torch.cat((torch.zeros_like(rows[0][:1]), *rows))
     filled[1:, -1] += _missed_between(scene, coarse, index, filled)[wanted]
     return index, filled
 
 
 def _missed_between(scene: Scene, coarse: _Coarse, index: Tensor, rows: Tensor) -> Tensor:
-    """Errors of colours in the middles of cells, seen into the surface: the largest around each of the points (X, Y, Z)."""
-    field, coloring, cells, densities = scene.field, scene.field.coloring, coarse.refined, coarse.densities
+    """Errors of colours in the middles of cells, seen into the surface: the largest around each of the points (X, Y, Z).
+
+    Of every second cell, as on a chess board: four of those around a point.
+    """
+    field, coloring, densities = scene.field, scene.field.coloring, coarse.densities
     assert coloring is not None  # its caller has asked
+    x, y, z = (torch.arange(size, device=densities.device) for size in coarse.refined.shape)
+    cells = coarse.refined & ((x[:, None, None] + y[:, None] + z) % 2 == 0)
     slopes = torch.stack([_difference(densities, axis)[cells] for axis in range(3)], dim=-1)
     flat = slopes.norm(dim=-1, keepdim=True) < 1e-6
     inward = torch.where(flat, slopes.new_tensor((0.0, 1.0, 0.0)), slopes)

@@ -4,6 +4,7 @@ Letters: R rays, P groups of samples that have one colour.
 """
 
 import logging
+from collections.abc import Callable
 from typing import final
 
 import torch
@@ -64,7 +65,7 @@ class BakedRenderer(AbstractRenderer):
         self.tolerance, self.factor = tolerance, factor
         self._culled = CulledRenderer(**self.settings)
 
-    def prepared(self, scene: Scene) -> Scene:
+    def prepared(self, scene: Scene, on_share: Callable[[float], object] = lambda share: None) -> Scene:
         """The scene with its finest field baked, for many pictures of it; as it is where it can not be."""
         if self.tolerance <= 0.0 or isinstance(scene.field, BakedField):
             return scene
@@ -74,7 +75,13 @@ class BakedRenderer(AbstractRenderer):
                 "renderer=culled. density=view_free can be baked."
             )
             return scene
-        baked = bake(scene, tolerance=self.tolerance, memory_mib=self.memory_mib, factor=self.factor)
+        baked = bake(
+            scene,
+            tolerance=self.tolerance,
+            memory_mib=self.memory_mib,
+            factor=self.factor,
+            on_share=on_share,
+        )
         return Scene(BakedField(baked, scene.field.coloring, scene.field), None, scene.bounds)
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:

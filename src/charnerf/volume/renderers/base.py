@@ -85,8 +85,13 @@ class AbstractRenderer(ABC):
             generator: Jitters the samples (training); without it the result is deterministic.
         """
 
-    def prepared(self, scene: Scene) -> Scene:
-        """The scene as it is best looked at many times: with what this renderer computes once for all of its pictures."""
+    def prepared(self, scene: Scene, on_share: Callable[[float], object] = lambda share: None) -> Scene:
+        """The scene as it is best looked at many times: with what this renderer computes once for all of its pictures.
+
+        Args:
+            scene: One character.
+            on_share: Called again and again with the share of that work that is done, in [0, 1]; what it raises ends it.
+        """
         return scene
 
     def render_camera(self, scene: Scene, camera: Cameras) -> Rendering:
