@@ -47,6 +47,20 @@ def test_the_order_of_views_does_not_matter(name, num_views):
     )
 
 
+@pytest.mark.parametrize("name", ["sa", "view_mha", "learned"])
+def test_shares_of_views_are_those_of_what_is_combined(name):
+    """They sum to one, and hidden views get none."""
+    features, dirs, sources, valid = inputs(3)
+    combine = make(name)
+    shares = combine.view_shares(features, dirs, sources, valid)
+    torch.testing.assert_close(shares.sum(-1), torch.ones(POINTS, dtype=torch.float64))
+    seen_by_some = valid.any(-1)
+    assert not shares[seen_by_some][~valid[seen_by_some]].any()
+    if name == "learned":
+        combined = combine(features, dirs, sources, valid)
+        torch.testing.assert_close(combined, (shares[..., None] * features).sum(1))
+
+
 @pytest.mark.parametrize("name", ["mean", "learned"])
 def test_one_view_is_itself(name):
     features, dirs, sources, valid = inputs(1)

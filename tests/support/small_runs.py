@@ -11,8 +11,10 @@ from omegaconf import DictConfig
 from charnerf.config.composition import compose_config
 from charnerf.data.datamodule import MixedDataModule
 from charnerf.inference.build import build_model, build_renderer
+from charnerf.training.board import Board
 from charnerf.training.clock import RunClock
 from charnerf.training.data import build_data
+from charnerf.training.identity import settings_of
 from charnerf.training.module import TrainingModule
 from charnerf.training.run import build_losses, build_module
 from charnerf.training.trainer import build_trainer
@@ -53,6 +55,7 @@ class SmallRun:
     data: MixedDataModule
     trainer: L.Trainer
     clock: RunClock
+    board: Board
     recorder: Recorder = field(default_factory=Recorder)
 
     def fit(self, checkpoint: Path | None = None) -> "SmallRun":
@@ -72,10 +75,11 @@ def assemble(cfg: DictConfig, folder: Path, *, cut_at: int | None = None) -> Sma
     losses, needs = build_losses(cfg)
     module = build_module(cfg, model, build_renderer(cfg), losses, clock)
     data = build_data(cfg, Path(cfg.data.root), model, clock, needs)
-    trainer = build_trainer(cfg, folder, clock, losses.names)
+    board = Board(folder=folder / "tensorboard", clock=clock, settings=settings_of(cfg))
+    trainer = build_trainer(cfg, folder, clock, losses.names, board)
     recorder = Recorder(cut_at=cut_at)
     trainer.callbacks.insert(1, recorder)  # type: ignore[attr-defined]
-    return SmallRun(module, data, trainer, clock, recorder)
+    return SmallRun(module, data, trainer, clock, board, recorder)
 
 
 def weights(module: torch.nn.Module) -> torch.Tensor:

@@ -17,7 +17,6 @@ TIMED = {  # what holds seconds, dates or settings that may differ
     "config.yaml",
     "curve.csv",
     "curve.png",
-    "hparams.yaml",
     "metrics.json",
     "report.html",
     "report.md",

@@ -2,6 +2,8 @@
 
 import csv
 
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
 from support import small_runs
 
 TERM = '''"""Fields shall be thin at the character's feet."""
@@ -40,8 +42,9 @@ def test_a_term_from_outside_is_trained_logged_and_weighed_by_phases(figure_data
         "schedule.phases.0.until.share=0.5",
         "+schedule.phases.1.loss_weights={thin:0}",
     )
-    run = small_runs.assemble(small_runs.smoke_config(figure_dataset, *mine, *phases), tmp_path / "run").fit()
-    assert "train/loss/thin" in run.trainer.callback_metrics
+    small_runs.assemble(small_runs.smoke_config(figure_dataset, *mine, *phases), tmp_path / "run").fit()
+    events = EventAccumulator(str(tmp_path / "run" / "tensorboard")).Reload()
+    assert "train/loss/thin" in events.Tags()["scalars"]
     with (tmp_path / "run/curve.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0])[-2:] == ["occupancy", "thin"]

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,6 +21,7 @@ from charnerf.training.optimization import rate_at
 from charnerf.training.run import run_training, training_renderer
 from charnerf.training.start import begin
 from support import small_runs
+from support.tags import promised_tags
 
 STEPS = 40
 VALUES = ("reconstruction", "surface_rgb", "surface_alpha", "opacity", "depth", "occupancy")  # of the loss
@@ -95,25 +97,36 @@ def test_the_curve_has_a_row_a_validation(run_folder):
     assert all(float(row[term]) >= 0 for row in rows for term in VALUES)
 
 
-def test_tensorboards_own_reader_finds_everything(run_folder):
+def test_tensorboards_own_reader_finds_what_the_page_promises(run_folder):
+    """No less, and no more."""
     events = EventAccumulator(str(run_folder / "tensorboard"), size_guidance={"tensors": 0}).Reload()
-    tags = events.Tags()
-    scalars = set(tags["scalars"])
-    wanted = {f"train/loss/{term}" for term in (*VALUES, "total")}
-    wanted |= {"train/rays", "train/surface_points", "train/phase", "train/seconds", "train/lr"}
-    wanted |= {"train/opacity_foreground", "val/psnr", "val/psnr_foreground", "val/ssim"}
-    assert wanted <= scalars
-    assert {event.value for event in events.Scalars("train/rays")} <= {16.0, 32.0}
+    tags, promised = events.Tags(), promised_tags()
+    meshes = {re.sub("_(VERTEX|FACE|COLOR)$", "", tag) for tag in tags["tensors"] if tag.startswith("mesh/")}
+    found = {*tags["scalars"], *tags["images"], *meshes}
+    assert {tag for tag, one in promised.items() if not any(map(one.fullmatch, found))} == set()
+    assert {tag for tag in found if not any(one.fullmatch(tag) for one in promised.values())} == set()
+    assert {f"train/loss/{term}" for term in (*VALUES, "total")} <= found
+    assert {"by_milliseconds/psnr/phase_0", "by_milliseconds/psnr/phase_1", "mesh/twin"} <= found
+    assert {f"attention/{view}" for view in ("front", "side", "back")} <= found
+
+
+def test_what_tensorboard_shows_is_true(run_folder):
+    events = EventAccumulator(str(run_folder / "tensorboard"), size_guidance={"tensors": 0}).Reload()
+    assert [event.value for event in events.Scalars("train/rays")] == [16.0, 32.0]
+    assert [event.step for event in events.Scalars("val/ssim")] == [20, 40]
     seconds = [event.value for event in events.Scalars("train/seconds")]
     assert seconds == sorted(seconds) and seconds[0] > 0
-    assert {"val/inputs/0", "val/truth_prediction_depth_opacity/0"} <= set(tags["images"])
-    grid = events.Images("val/truth_prediction_depth_opacity/0")[-1]
-    assert (grid.width, grid.height) == (4 * 32, 32)
-    assert (events.Images("val/inputs/0")[-1].width, len(events.Images("val/inputs/0"))) == (3 * 32, 2)
-    assert any(tag.startswith("mesh/twin") for tag in tags["tensors"])
+    shares = [tag for tag in events.Tags()["scalars"] if tag.startswith("attention/")]
+    for number in range(2):
+        assert sum(events.Scalars(tag)[number].value for tag in shares) == pytest.approx(1.0, abs=1e-5)
+    pictures = events.Images("val/target_prediction_error_depth_opacity/0")
+    assert [(one.width, one.height, one.step) for one in pictures] == [(5 * 32, 32, 20), (5 * 32, 32, 40)]
+    metrics = json.loads((run_folder / "metrics.json").read_text())
+    final = {tag: events.Scalars(f"Final/{tag}")[0].value for tag in ("psnr", "seconds_train")}
+    expected = {"psnr": metrics["psnr"], "seconds_train": metrics["seconds"]["train"]}
+    assert final == pytest.approx(expected, rel=1e-5)
     settings = events.summary_metadata["_hparams_/session_start_info"].plugin_data.content
     assert b"num_parameters" in settings and b"model.box_half_extent" in settings
-    assert b"val/psnr_foreground" in events.summary_metadata["_hparams_/experiment"].plugin_data.content
 
 
 @pytest.mark.parametrize("split", ["train=[train,more]", "val=more", "test=more"])

@@ -16,10 +16,10 @@ from charnerf.errors import ConfigError, DataError
 from charnerf.geometry.cameras import direction_from_angles, pixel_centres, pixel_rays
 from charnerf.geometry.framing import framing_camera
 from charnerf.models.charnerf import CharNeRF
-from charnerf.models.combinators.base import masked_logits, view_weights
+from charnerf.models.combinators.base import AbstractCombinator, AbstractWeighing, masked_logits, view_weights
 from charnerf.models.combinators.view_attention import AttentionLogits, ViewAttention
 from charnerf.scene import Scene
-from charnerf.types import Cameras, SourceViews
+from charnerf.types import Cameras, RenderOutput, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 ATTENTION_FILE = "attention.json"
@@ -127,11 +127,9 @@ def attention_profile(
         num_points += sum(len(one.valid) for one in inputs)
     num_views = means[0][2].shape[-1]
     factor = float(combinator.scale * combinator.view_scale.square() / num_views)
-    names = list(characters[0].source_names)
-    names += [f"mirrored {number}" for number in range(1, num_views - len(names) + 1)]
     return AttentionProfile(
         characters=[one.name for one in characters],
-        sources=names,
+        sources=view_labels(characters[0], num_views),
         azimuth_deg=azimuths,
         features=[features.tolist() for features, _, _ in means],
         view=[view.tolist() for _, view, _ in means],
@@ -150,28 +148,55 @@ def _curve(azimuths_deg: Sequence[float], sources: SourceViews, factor: float) -
     return (factor * (around @ towards.T).sum(-1)).tolist()
 
 
+def view_labels(character: Character, num_views: int) -> list[str]:
+    """Names of the views that a model uses of a character: its drawings, then mirrored ones."""
+    names = list(character.source_names)
+    return names + [f"mirrored {number}" for number in range(1, num_views - len(names) + 1)]
+
+
+@torch.no_grad()
+def mean_shares(
+    combinator: AbstractWeighing, scene: Scene, picture: RenderOutput, camera: Cameras
+) -> Tensor | None:
+    """Shares (V) of the views, means over the points that a picture of a scene shows; None where it shows nothing."""
+    given = _given(combinator, scene, picture, camera)
+    if given is None:
+        return None
+    return combinator.view_shares(given.view_features, given.view_dirs, given.source_dirs, given.valid).mean(
+        0
+    )
+
+
 def _seen(
     combinator: ViewAttention, scene: Scene, renderer: AbstractRenderer, camera: Cameras, name: str
 ) -> _Inputs:
     """What the combinator sees of the points that a camera sees, one a pixel."""
-    picture = renderer.render_camera(scene, camera).finest
-    rays = pixel_rays(camera, pixel_centres(camera.width, camera.height, device=picture.depth.device))
-    seen = picture.opacity > 0.5
-    if not bool(seen.any()):
+    given = _given(combinator, scene, renderer.render_camera(scene, camera).finest, camera)
+    if given is None:
         raise DataError(
             f"{name}: the model shows nothing of it, expected points to look at; was it trained long enough?"
         )
+    return given
+
+
+def _given(
+    combinator: AbstractCombinator, scene: Scene, picture: RenderOutput, camera: Cameras
+) -> _Inputs | None:
+    """What the combinator sees of the points that a picture shows, one a pixel; None where it shows nothing."""
+    rays = pixel_rays(camera, pixel_centres(camera.width, camera.height, device=picture.depth.device))
+    seen = picture.opacity > 0.5
+    if not bool(seen.any()):
+        return None
     directions = rays.directions[seen]
     points = rays.origins[seen] + picture.depth[seen][:, None] * directions
     with _recorded(combinator) as calls:
         scene.field(points, directions)
-    return next(
-        call for call in reversed(calls) if bool(call.view_dirs.any())
-    )  # densities may see no direction
+    seeing = [call for call in calls if bool(call.view_dirs.any())]  # densities may see no direction
+    return (seeing or calls)[-1]
 
 
 @contextmanager
-def _recorded(combinator: ViewAttention) -> Iterator[list[_Inputs]]:
+def _recorded(combinator: AbstractCombinator) -> Iterator[list[_Inputs]]:
     """Collect a combinator's inputs while the context lasts."""
     calls: list[_Inputs] = []
     handle = combinator.register_forward_pre_hook(lambda _, inputs: calls.append(_Inputs(*inputs)))

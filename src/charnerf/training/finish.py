@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import lightning as L
-import numpy as np
 import torch
-from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig
 
 from charnerf.data.characters import load_character
@@ -21,13 +19,13 @@ from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.meshing.build import BuiltMesh, build_mesh
 from charnerf.meshing.export import save_mesh
-from charnerf.meshing.extract import vertex_colors
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
 from charnerf.reporting.formats import seconds_text
 from charnerf.reporting.run_report import write_run_report
 from charnerf.scene import Scene
+from charnerf.training.board import Board
 from charnerf.training.threads import ThreadTuner
 from charnerf.types import SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -45,6 +43,7 @@ def finish_run(
     train_seconds: float,
     threads: ThreadTuner,
     trainer: L.Trainer,
+    board: Board,
 ) -> None:
     """Evaluate the test split, shared out among the processes of a training, write metrics.json, meshes/ and the report.
 
@@ -56,7 +55,8 @@ def finish_run(
         renderer: For evaluation.
         train_seconds: Training time, evaluation excluded.
         threads: What the steps were taken with.
-        trainer: Its logger gets the mesh.
+        trainer: That trained it.
+        board: Gets the mesh and the final figures.
     """
 
     def make_mesh(scene: Scene, views: SourceViews) -> BuiltMesh:
@@ -80,7 +80,8 @@ def finish_run(
     size = sum(parameter.numel() for parameter in model.parameters())
     write_metrics(folder / "metrics.json", {**metrics, "num_parameters": size, "steps": trainer.global_step})
     first = names_of(read_dataset(root), cfg.splits.test)[0]
-    write_first_mesh(folder, root, first, model, trainer)
+    write_first_mesh(folder, root, first, model, board)
+    board.finish(metrics)
     _tell(metrics, write_run_report(folder))
 
 
@@ -97,7 +98,7 @@ def _tell(metrics: Mapping[str, Any], report: Path) -> None:
     )
 
 
-def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, trainer: L.Trainer) -> None:
+def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, board: Board) -> None:
     """Write one character's mesh, into TensorBoard too; says so where the field has no surface."""
     device = next(model.parameters()).device
     with torch.no_grad():
@@ -111,13 +112,4 @@ def write_first_mesh(folder: Path, root: Path, name: str, model: CharNeRF, train
     (folder / "meshes").mkdir(exist_ok=True)
     save_mesh(built.mesh, folder / "meshes" / f"{name}.glb")
     contact_sheet(built.mesh, sources).save(folder / "meshes" / f"{name}_sheet.png")
-    colors = vertex_colors(built.mesh)
-    if isinstance(trainer.logger, TensorBoardLogger) and colors is not None:
-        trainer.logger.experiment.add_mesh(
-            f"mesh/{name}",
-            vertices=torch.from_numpy(np.asarray(built.mesh.vertices, dtype=np.float32)[None]),
-            colors=torch.from_numpy(colors[None, :, :3].copy()),
-            faces=torch.from_numpy(np.asarray(built.mesh.faces, dtype=np.int64)[None]),
-            global_step=trainer.global_step,
-        )
-        trainer.logger.finalize("success")
+    board.add_mesh(name, built.mesh)

@@ -52,7 +52,7 @@ class RunIdentity(L.Callback):
     """
 
     def __init__(self, cfg: DictConfig, data: Mapping[str, str]) -> None:
-        self.config, self.data = _settings(cfg), dict(data)
+        self.config, self.data = settings_of(cfg), dict(data)
 
     def on_save_checkpoint(
         self, trainer: L.Trainer, pl_module: L.LightningModule, checkpoint: dict[str, Any]
@@ -86,7 +86,7 @@ class WrittenRun:
         Raises:
             ConfigError: Names every key that differs.
         """
-        _compare(self.file, self.config, _settings(cfg), "settings")
+        _compare(self.file, self.config, settings_of(cfg), "settings")
 
     def check_data(self, data: Mapping[str, str]) -> None:
         """Check that it was trained on this data set.
@@ -116,7 +116,7 @@ def written_run(file: Path) -> WrittenRun:
     return WrittenRun(file, run["config"], run["data"])
 
 
-def _settings(cfg: DictConfig) -> dict[str, Setting]:
+def settings_of(cfg: DictConfig) -> dict[str, Setting]:
     """Everything that a config says, by full keys; the order of a list of parts counts, so it is a setting too."""
     plain = OmegaConf.to_container(cfg, resolve=True)
     assert isinstance(plain, dict)

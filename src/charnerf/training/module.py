@@ -16,7 +16,7 @@ from charnerf.models.charnerf import CharNeRF
 from charnerf.pictures import on_white
 from charnerf.scene import AbstractField
 from charnerf.training.optimization import OptimizerOf, optimizer_of, rate_at
-from charnerf.types import RenderOutput, TrainBatch
+from charnerf.types import LeftOut, RenderOutput, TrainBatch
 from charnerf.volume.renderers.base import AbstractRenderer
 
 MEASURES = ("val/psnr", "val/ssim", "val/psnr_foreground")
@@ -55,6 +55,7 @@ class TrainingModule(L.LightningModule):
         self.final_rate = final_rate
         self.position = position
         self.logged: dict[str, Tensor | float] = {}  # by the last step, of all processes
+        self.left_out = LeftOut()  # by the last step, of this process's rays
         self._measured: list[tuple[float, ...]] = []  # in this validation, a row a picture: index, MEASURES
 
     def training_step(self, batch: TrainBatch, batch_idx: int) -> Tensor:
@@ -69,6 +70,7 @@ class TrainingModule(L.LightningModule):
         if renderings[0].coarse is not None:
             coarse = [r.coarse for r in renderings if r.coarse is not None]
             passes.append(_pass(coarse, [s.coarse for s in scenes]))
+        self.left_out = sum((rendering.left_out for rendering in renderings), LeftOut())
         loss, values = self.losses(passes, batch, generators)
         shown = batch.alpha > 0.5
         seen = (passes[0].rays.opacity * shown).sum(), shown.sum()
@@ -86,18 +88,17 @@ class TrainingModule(L.LightningModule):
             "train/seconds": self.position().seconds,
             "train/lr": float(self._param_groups()[0]["lr"]),
         }
-        self.log_dict(self.logged, batch_size=1)
         return loss
 
-    def validation_step(self, view: ValidationView, batch_idx: int) -> dict[str, RenderOutput]:
-        """Render one picture of a validation character and measure it; what was measured is returned, to be shown."""
-        encoded = self.model.encode(view.views, view.hull)
-        rendered = self.eval_renderer.render_camera(self.model.scene(encoded, 0), view.camera).finest
+    def validation_step(self, view: ValidationView, batch_idx: int) -> dict[str, Any]:
+        """Render one picture of a validation character and measure it; both are returned, to be shown."""
+        scene = self.model.scene(self.model.encode(view.views, view.hull), 0)
+        rendered = self.eval_renderer.render_camera(scene, view.camera).finest
         rgb, target = rendered.rgb.float().clamp(0.0, 1.0), on_white(view.rgba)
         foreground = psnr_foreground(rgb, target, view.rgba[..., 3])
         scores = psnr(rgb, target), ssim(rgb, target), math.nan if foreground is None else foreground
         self._measured.append((view.index, *scores))
-        return {"rendered": rendered}
+        return {"scene": scene, "rendered": rendered}
 
     def on_validation_epoch_end(self) -> None:
         """Log the means over the pictures of all processes, each picture once and in its order."""

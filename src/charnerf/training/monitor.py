@@ -1,4 +1,4 @@
-"""What a run shows while it trains: a progress bar with time left, the curve, pictures."""
+"""What a run tells while it trains: a progress bar with the time left, and curve.csv."""
 
 import csv
 import io
@@ -7,17 +7,11 @@ from pathlib import Path
 from typing import Any, final
 
 import lightning as L
-import torch
-from lightning.pytorch.loggers import TensorBoardLogger
-from torch import Tensor
 
-from charnerf.data.validation import ValidationView
 from charnerf.files import write_text
-from charnerf.pictures import on_white
 from charnerf.progress import Progress
 from charnerf.training.clock import RunClock
 from charnerf.training.module import TrainingModule
-from charnerf.types import RenderOutput
 
 CURVE_COLUMNS = (
     "step",
@@ -28,7 +22,6 @@ CURVE_COLUMNS = (
     "val_psnr_foreground",
     "val_ssim",
 )  # then the losses
-PICTURES = 4
 
 
 @final
@@ -61,7 +54,8 @@ class BudgetBar(L.Callback):
             return
         rest, note = self.progress.costs["training"], None
         if self.clock.steps % 10 == 0:
-            loss = trainer.callback_metrics.get("train/loss/total")
+            assert isinstance(pl_module, TrainingModule)
+            loss = pl_module.logged.get("train/loss/total")
             best = trainer.callback_metrics.get("val/psnr_foreground")
             note = f"step {self.clock.steps}, loss {'-' if loss is None else f'{float(loss):.4f}'}"
             note += "" if best is None else f", val {float(best):.2f} dB on the foreground"
@@ -137,50 +131,3 @@ class CurveWriter(L.Callback):
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Go on from a checkpoint."""
         self.rows = list(state_dict["rows"])
-
-
-@final
-class PictureLogger(L.Callback):
-    """Logs image grids at validation: the drawings, then truth, prediction, depth and opacity of some characters."""
-
-    def on_validation_batch_end(  # type: ignore[override]
-        self,
-        trainer: L.Trainer,
-        pl_module: L.LightningModule,
-        outputs: dict[str, RenderOutput],
-        batch: ValidationView,
-        batch_idx: int,
-        dataloader_idx: int = 0,
-    ) -> None:
-        """Draw the first view of each of the first characters, as it was measured."""
-        number, view = divmod(batch.index, trainer.datamodule.val_views)  # type: ignore[attr-defined]
-        board = pl_module.logger
-        if (
-            trainer.sanity_checking
-            or view >= trainer.world_size  # not the first of the character's that this process draws
-            or number >= PICTURES
-            or not isinstance(board, TensorBoardLogger)
-        ):
-            return
-        rendered = outputs["rendered"]
-        opacity = rendered.opacity[..., None].expand_as(rendered.rgb)
-        grey = _nearness(rendered)[..., None].expand_as(rendered.rgb)
-        pictures = [on_white(batch.rgba), rendered.rgb, grey, opacity]
-        drawings = [on_white(image.permute(1, 2, 0)) for image in batch.views.images[0]]
-        step = trainer.global_step
-        board.experiment.add_image(f"val/inputs/{number}", _row(drawings), step)
-        board.experiment.add_image(f"val/truth_prediction_depth_opacity/{number}", _row(pictures), step)
-
-
-def _nearness(output: RenderOutput) -> Tensor:
-    """Depth as grey (H, W): what is seen from white, nearest, to grey; what shows nothing is black."""
-    seen = output.opacity > 0.5
-    if not bool(seen.any()):
-        return torch.zeros_like(output.depth)
-    near, far = output.depth[seen].min(), output.depth[seen].max()
-    return torch.where(seen, 1.0 - 0.75 * (output.depth - near) / (far - near).clamp_min(1e-6), 0.0)
-
-
-def _row(pictures: list[Tensor]) -> Tensor:
-    """Pictures (H, W, 3) beside one another as (3, H, W * n)."""
-    return torch.cat([p.float().clamp(0, 1) for p in pictures], dim=1).permute(2, 0, 1).cpu()

@@ -22,17 +22,18 @@ from charnerf.interruption import Stopped, held
 from charnerf.losses.base import Needs
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
+from charnerf.training.board import Board
 from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.clock import RunClock
 from charnerf.training.data import build_data
 from charnerf.training.finish import finish_run
-from charnerf.training.identity import RunIdentity, WrittenRun, data_of, written_run
+from charnerf.training.identity import RunIdentity, WrittenRun, data_of, settings_of, written_run
 from charnerf.training.module import TrainingModule
 from charnerf.training.processes import first_speaks, meet, processes_to_begin, run_processes
 from charnerf.training.run_lock import RunLock
 from charnerf.training.start import begin
 from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
-from charnerf.training.trainer import build_trainer, log_hyperparameters
+from charnerf.training.trainer import build_trainer
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
@@ -164,11 +165,11 @@ def _train(prepared: _Prepared, network: _Network) -> None:
     renderer = build_renderer(cfg)
     module = build_module(cfg, model, renderer, losses, clock)
     data = build_data(cfg, root, model, clock, needs)
+    board = Board(folder=folder / "tensorboard", clock=clock, settings=settings_of(cfg))
     threads = ThreadTuner(adapts=may_choose(budget_seconds=cfg.budget.seconds))
     with held(), named_full_disk(folder):  # until a checkpoint, or the weights, are whole
-        trainer = build_trainer(cfg, folder, clock, losses.names, threads, prepared.identity)
+        trainer = build_trainer(cfg, folder, clock, losses.names, board, threads, prepared.identity)
         if trainer.is_global_zero:
-            log_hyperparameters(trainer, cfg, model)
             _note_start(folder, network.start)
         _fit(trainer, module, data, prepared.checkpoint)
         if trainer.is_global_zero:
@@ -184,6 +185,7 @@ def _train(prepared: _Prepared, network: _Network) -> None:
             train_seconds=clock.seconds,
             threads=threads,
             trainer=trainer,
+            board=board,
         )
 
 

@@ -1,4 +1,4 @@
-"""Lightning's trainer of a run, and the config as TensorBoard shows it."""
+"""Lightning's trainer of a run."""
 
 import os
 from collections.abc import Sequence
@@ -8,28 +8,25 @@ from pathlib import Path
 
 import lightning as L
 from lightning.pytorch.callbacks import Checkpoint, ModelCheckpoint
-from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.plugins.environments import (
     ClusterEnvironment,
     LightningEnvironment,
     SLURMEnvironment,
     TorchElasticEnvironment,
 )
-from omegaconf import DictConfig, OmegaConf
-from torch.utils.tensorboard.summary import hparams
+from omegaconf import DictConfig
 
 from charnerf.inference.build import build_part
 from charnerf.inference.weights import save_config
-from charnerf.models.charnerf import CharNeRF
 from charnerf.training.averaging import WeightAverage
+from charnerf.training.board import Board
 from charnerf.training.checkpoint import LAST, CheckpointFiles, LastCheckpoint
 from charnerf.training.clock import RunClock
 from charnerf.training.guards import FiniteGuard, WhiteAlarm
-from charnerf.training.identity import flat_settings
-from charnerf.training.monitor import BudgetBar, CurveWriter, PictureLogger
+from charnerf.training.monitor import BudgetBar, CurveWriter
+from charnerf.training.validation_pictures import ShareWriter, ValidationPictures
 
 CHECKPOINT_EVERY = timedelta(minutes=5)  # at most; validations write checkpoints too
-HYPER_METRICS = ("val/psnr", "val/psnr_foreground", "val/ssim")  # columns beside the hyper-parameters
 
 
 def build_trainer(
@@ -37,6 +34,7 @@ def build_trainer(
     folder: Path,
     clock: RunClock,
     values: Sequence[str],
+    board: Board,
     *more: L.Callback,
 ) -> L.Trainer:
     """Lightning's trainer with our callbacks; the budget, not Lightning, bounds the run.
@@ -46,6 +44,7 @@ def build_trainer(
         folder: The run folder.
         clock: Of the run.
         values: Names of the loss's values.
+        board: Writes what TensorBoard shows.
         more: Further callbacks.
     """
     averages = [] if cfg.averaging.decay is None else [WeightAverage(decay=cfg.averaging.decay)]
@@ -57,7 +56,9 @@ def build_trainer(
         FiniteGuard(folder=folder),
         WhiteAlarm(),
         CurveWriter(path=folder / "curve.csv", clock=clock, values=values),
-        PictureLogger(),
+        ValidationPictures(board=board),
+        ShareWriter(board=board),
+        board,  # after what is shown, before checkpoints
         *_checkpoints(cfg, folder),
     ]
     return build_part(
@@ -65,14 +66,13 @@ def build_trainer(
         {
             "callbacks": callbacks,
             "plugins": [CheckpointFiles(), environment()],
-            "logger": TensorBoardLogger(str(folder), name="", version="tensorboard", default_hp_metric=False),
+            "logger": False,  # the board writes
             "max_epochs": -1,
             "num_sanity_val_steps": 0,
             "enable_progress_bar": False,
             "enable_model_summary": False,
             "use_distributed_sampler": False,
             "gradient_clip_val": cfg.optimization.gradient_clip,
-            "log_every_n_steps": 20,
         },
     )
 
@@ -102,13 +102,3 @@ def environment() -> ClusterEnvironment:
     if SLURMEnvironment.detect() and os.environ["SLURM_NTASKS"] != "1":
         return SLURMEnvironment(auto_requeue=False)
     return TorchElasticEnvironment() if TorchElasticEnvironment.detect() else LightningEnvironment()
-
-
-def log_hyperparameters(trainer: L.Trainer, cfg: DictConfig, model: CharNeRF) -> None:
-    """Write the config and the number of parameters to TensorBoard's events and to hparams.yaml."""
-    assert isinstance(trainer.logger, TensorBoardLogger)
-    size = sum(parameter.numel() for parameter in model.parameters())
-    values = {**flat_settings(OmegaConf.to_container(cfg, resolve=True)), "num_parameters": size}
-    trainer.logger.log_hyperparams(values)  # writes no event unless it is given a metric's value
-    for summary in hparams(values, dict.fromkeys(HYPER_METRICS, 0.0)):
-        trainer.logger.experiment.file_writer.add_summary(summary)

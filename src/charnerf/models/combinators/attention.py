@@ -6,11 +6,11 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.geometry.safe import safe_normalize
-from charnerf.models.combinators.base import AbstractCombinator, masked_logits, view_weights
+from charnerf.models.combinators.base import AbstractWeighing, masked_logits, view_weights
 from charnerf.models.fused import pair_dots, sum_views
 
 
-class AbstractAttention(AbstractCombinator):
+class AbstractAttention(AbstractWeighing):
     """Multi-head attention over the views; what enters the softmax beside the features is the combinator's own.
 
     Args:
@@ -63,10 +63,8 @@ class AbstractAttention(AbstractCombinator):
 
     def attend(self, logits: Tensor, view_features: Tensor, valid: Tensor) -> Tensor:
         """Attention with logits (P, K, V, V) over features (P, V, D), then the mean over rows: (P, D)."""
-        weights = torch.softmax(masked_logits(logits, valid), dim=-1)
-        # the mean over rows commutes with the weighted sum of values: average the weights first
-        row_weights = view_weights(valid, weights.dtype)
-        averaged = (weights * row_weights[:, None, :, None]).sum(2)  # (P, K, V key)
+        row_weights = view_weights(valid, logits.dtype)
+        averaged = _head_shares(logits, row_weights, valid)
         values = self.split(self.values(view_features))
         fused = sum_views(averaged.transpose(1, 2), values).flatten(-2)  # (P, A)
         if self.output is not None:
@@ -74,3 +72,14 @@ class AbstractAttention(AbstractCombinator):
         if self.is_residual:
             fused = fused + sum_views(row_weights, view_features)
         return fused if self.norm is None else self.norm(fused)
+
+
+def mean_shares(logits: Tensor, valid: Tensor) -> Tensor:
+    """Shares (P, V) of the views by logits (P, K, V, V): means over heads and rows."""
+    return _head_shares(logits, view_weights(valid, logits.dtype), valid).mean(1)
+
+
+def _head_shares(logits: Tensor, row_weights: Tensor, valid: Tensor) -> Tensor:
+    """Shares (P, K, V) by logits (P, K, V, V), means over rows: the mean commutes with the weighted sum of values."""
+    weights = torch.softmax(masked_logits(logits, valid), dim=-1)
+    return (weights * row_weights[:, None, :, None]).sum(2)

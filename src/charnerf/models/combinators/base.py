@@ -31,6 +31,16 @@ class AbstractCombinator(nn.Module, ABC):
         """
 
 
+class AbstractWeighing(AbstractCombinator):
+    """A combinator that decides by the point what each view counts for."""
+
+    @abstractmethod
+    def view_shares(
+        self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
+    ) -> Tensor:
+        """Shares of the views (P, V), of sum 1, of what `forward` is given."""
+
+
 def view_weights(valid: Tensor, dtype: object) -> Tensor:
     """Weights (P, V) that average over the valid views, or over all where none is valid."""
     counted = (valid | ~valid.any(-1, keepdim=True)).to(dtype)  # type: ignore[call-overload]

@@ -5,12 +5,12 @@ from typing import final
 import torch
 from torch import Tensor, nn
 
-from charnerf.models.combinators.base import AbstractCombinator, masked_logits
+from charnerf.models.combinators.base import AbstractWeighing, masked_logits
 from charnerf.models.fused import score_rows, sum_views
 
 
 @final
-class LearnedWeights(AbstractCombinator):
+class LearnedWeights(AbstractWeighing):
     """Softmax over the views of a small network's score of (feature, cosine to the query, source direction).
 
     Args:
@@ -30,6 +30,12 @@ class LearnedWeights(AbstractCombinator):
 
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
         """Fuse (P, V, D) to (P, D)."""
+        return sum_views(self.view_shares(view_features, view_dirs, source_dirs, valid), view_features)
+
+    def view_shares(
+        self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
+    ) -> Tensor:
+        """Weights (P, V) by which the views are averaged."""
         cosines = (view_dirs[:, None] * source_dirs).sum(-1, keepdim=True)
         angles = self.from_angles(torch.cat((cosines, source_dirs), dim=-1))
         logits = score_rows(
@@ -40,5 +46,4 @@ class LearnedWeights(AbstractCombinator):
             self.score.weight,
             self.score.bias,
         ).view(valid.shape)
-        weights = torch.softmax(masked_logits(logits, valid), dim=-1)
-        return sum_views(weights, view_features)
+        return torch.softmax(masked_logits(logits, valid), dim=-1)

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from charnerf.geometry.safe import safe_normalize
-from charnerf.models.combinators.attention import AbstractAttention
+from charnerf.models.combinators.attention import AbstractAttention, mean_shares
 
 
 @dataclass(frozen=True)
@@ -77,3 +77,10 @@ class ViewAttention(AbstractAttention):
         """Fuse (P, V, D) to (P, D)."""
         logits = self.logits(view_features, view_dirs, source_dirs)
         return self.attend(logits.features + logits.view, view_features, valid)
+
+    def view_shares(
+        self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
+    ) -> Tensor:
+        """Shares (P, V), means over heads and rows."""
+        logits = self.logits(view_features, view_dirs, source_dirs)
+        return mean_shares(logits.features + logits.view, valid)
