@@ -30,7 +30,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("reporting",),
     ("finetuning",),
     ("reconstruction", "training"),
-    ("app", "bench", "doctor", "stability"),
+    ("app", "bench", "doctor", "stability", "watching"),
     ("cli", "__init__"),
     ("__main__",),
 )

@@ -179,7 +179,7 @@ def is_locked(path: Path) -> bool:
         return False
     handle = os.open(path, os.O_RDWR if os.access(path, os.W_OK) else os.O_RDONLY)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)  # others may look at the same time
     except BlockingIOError:
         return True
     finally:

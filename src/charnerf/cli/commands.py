@@ -29,6 +29,7 @@ from charnerf.cli import (
     report,
     search,
     train,
+    watch,
 )
 from charnerf.cli.messages import quiet, say
 from charnerf.errors import CharNeRFError, ConfigError
@@ -72,6 +73,7 @@ for module in (
     check,
     doctor,
     search,
+    watch,
     env,
 ):
     door.command(module.__name__.rpartition(".")[2], epilog=_epilog(module.EXAMPLES))(module.command)

@@ -112,7 +112,10 @@ def _(block: Mesh) -> str:
 
 @_html.register
 def _(block: SideBySide) -> str:
-    kind = "row meshes" if any(isinstance(item, Mesh) for item in block.items) else "row"
+    is_wide = any(
+        isinstance(item, Mesh) or (isinstance(item, Picture) and _is_wide(item)) for item in block.items
+    )
+    kind = "row broad" if is_wide else "row"
     return f'<div class="{kind}">{"".join(_html(item) for item in block.items)}</div>'
 
 
@@ -135,6 +138,12 @@ def _(block: Plot) -> str:
         f'<figure class="plot"><div></div><script type="application/json">{figure}</script>'
         f"<figcaption>{html.escape(block.picture.caption)}</figcaption></figure>"
     )
+
+
+def _is_wide(block: Picture) -> bool:
+    """Whether a picture is more than one, side by side."""
+    with open_picture(block.path) as picture:
+        return picture.width > WIDE * picture.height
 
 
 def _figure(content: str, caption: str) -> str:
@@ -171,24 +180,37 @@ def _data_address(content: bytes, kind: str) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
-def to_html(title: str, blocks: Sequence[Block]) -> str:
-    """A report as one HTML file that needs nothing else; plots are still pictures where plotly is not installed."""
+def to_html(title: str, blocks: Sequence[Block], *, refreshes: bool = False) -> str:
+    """A report as one HTML file that needs nothing else; plots are still pictures where plotly is not installed.
+
+    Args:
+        title: Of the window.
+        blocks: What it shows.
+        refreshes: Whether it asks the server that it came from for what has changed, see live.js.
+    """
     library = plot_library() if any(isinstance(block, Plot) for block in blocks) else None
-    if library is None:
-        blocks = [block.picture if isinstance(block, Plot) else block for block in blocks]
-    body = "\n".join(_html(block) for block in blocks)
     scripts = [] if library is None else [f"<script>{library}</script>\n"]
     if any(isinstance(block, Mesh) for block in _each(blocks)):  # inert until page.js begins it
         scripts.append(f'<script type="text/plain" id="mesh-viewer">{viewer_script()}</script>\n')
     if scripts:
         scripts.append(f"<script>{_page_file('page.js')}</script>\n")
+    if refreshes:  # first, while diagrams are as they came
+        scripts.insert(0, f"<script>{_page_file('live.js')}</script>\n")
+    rules = f"{ALONE} 'self'" if refreshes else ALONE
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{ALONE}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{rules}">\n'
         f"<title>{html.escape(title)}</title>\n<style>{_page_file('page.css')}</style>\n</head>\n"
-        f"<body>\n<main>\n{body}\n</main>\n{''.join(scripts)}</body>\n</html>\n"
+        f"<body>\n<main>\n{to_html_blocks(blocks)}\n</main>\n{''.join(scripts)}</body>\n</html>\n"
     )
+
+
+def to_html_blocks(blocks: Sequence[Block]) -> str:
+    """Blocks as HTML, an element each."""
+    if plot_library() is None:
+        blocks = [block.picture if isinstance(block, Plot) else block for block in blocks]
+    return "\n".join(_html(block) for block in blocks)
 
 
 def _each(blocks: Sequence[Block]) -> Iterator[Block]:

@@ -22,6 +22,7 @@ from charnerf.training.identity import Setting
 from charnerf.training.module import MEASURES, TrainingModule
 
 EVERY = 20  # steps between two points of a line
+SECONDS = 10  # until what was written is on disk, for those who watch
 BY_TIME, FINAL, MESH = (
     "by_milliseconds",
     "Final",
@@ -57,7 +58,7 @@ class Board(L.Callback):
     def writer(self) -> SummaryWriter:
         """TensorBoard's, opened with the first thing that is written."""
         if self._writer is None:
-            self._writer = SummaryWriter(str(self.folder))
+            self._writer = SummaryWriter(str(self.folder), flush_secs=SECONDS)
         return self._writer
 
     def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
@@ -172,13 +173,12 @@ def layout(module: TrainingModule) -> dict[str, dict[str, list[Any]]]:
         "Loss": {
             "total": lines("train/loss/total$"),
             "terms": lines("train/loss/(?!total$).*"),
-            "opacity on the character": lines("train/opacity_foreground$"),
+            "learning rate": lines("train/lr$"),
         },
         "Speed": {
             "rays a second": lines("train/rays_per_second$"),
             "shares left out": lines("train/left_out/.*"),
             "memory, MiB": lines("train/memory_mib$"),
-            "learning rate": lines("train/lr$"),
         },
     }
     if isinstance(module.model.finest.combinator, AbstractWeighing):

@@ -1,15 +1,13 @@
 """TensorBoard's event files of a run that goes on: what came after its checkpoint is forgotten, so that no step comes twice."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-from tensorboard.backend.event_processing.event_file_loader import RawEventFileLoader
 from tensorboard.compat.proto.event_pb2 import Event
 from tensorboard.summary.writer.record_writer import RecordWriter
 
 from charnerf.files import write_aside
-
-PATTERN = "events.out.tfevents.*"
+from charnerf.reporting.event_file import event_files, read_events
 
 
 def forget(folder: Path, keeps: Callable[[str, int], bool]) -> None:
@@ -19,8 +17,8 @@ def forget(folder: Path, keeps: Callable[[str, int], bool]) -> None:
         folder: Of the event files; none where it is not there.
         keeps: Whether to keep what has a tag and a step.
     """
-    for file in sorted(folder.glob(PATTERN)):
-        events = list(_read(file))
+    for file in event_files(folder):
+        events = list(read_events(file))
         kept = [content for content, event in events if _is_kept(event, keeps)]
         if len(kept) <= 1:  # the first says the version
             file.unlink()
@@ -29,11 +27,6 @@ def forget(folder: Path, keeps: Callable[[str, int], bool]) -> None:
                 writer = RecordWriter(stream)
                 for content in kept:
                     writer.write(content)
-
-
-def _read(file: Path) -> Iterator[tuple[bytes, Event]]:
-    for content in RawEventFileLoader(str(file)).Load():
-        yield content, Event.FromString(content)
 
 
 def _is_kept(event: Event, keeps: Callable[[str, int], bool]) -> bool:
