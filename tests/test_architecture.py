@@ -24,6 +24,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("config", "models", "reconciling", "surfaces", "volume"),
     ("losses",),
     ("data", "meshing", "procedural"),
+    ("people",),
     ("capture", "evaluation"),
     ("drawings", "foreign"),
     ("inference",),

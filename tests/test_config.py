@@ -31,13 +31,9 @@ MODEL_GROUPS = (
 
 def overrides_for(option: Path) -> list[str]:
     overrides = [f"{option.parent}={option.stem}"]
-    needs_root = option.as_posix() in (
-        "data/folder.yaml",
-        "data/foreign.yaml",
-        "data/joined.yaml",
-        "data/shards.yaml",
-    )
-    return [*overrides, "data.root=/tmp"] if needs_root else overrides
+    needed = {"data": dict.fromkeys(("folder", "foreign", "joined", "shards"), "root") | {"people": "assets"}}
+    missing = needed.get(str(option.parent), {}).get(option.stem)
+    return [*overrides, f"{option.parent}.{missing}=/tmp"] if missing else overrides
 
 
 def problem(*overrides: str) -> str:

@@ -5,12 +5,14 @@ import torch
 
 from charnerf.capture import generated_data as module
 from charnerf.capture import shapes_data
+from charnerf.capture.people_data import PeopleData
 from charnerf.capture.procedural_data import ProceduralData
 from charnerf.capture.shapes_data import ShapesData
 from charnerf.data.characters import load_character
 from charnerf.data.folder import FolderData
 from charnerf.data.layout import read_dataset
 from charnerf.errors import DataError, DependencyError
+from tests.support.people_assets import write_assets
 
 
 def test_data_are_generated_once_under_a_name_for_its_settings(tmp_path, monkeypatch):
@@ -64,3 +66,25 @@ def test_what_shapes_need_is_missed_before_any_work(tmp_path, monkeypatch):
     with pytest.raises(DependencyError, match=r"manifold3d.*charnerf\[shapes\]"):
         data.check_image_size(8)
     assert not list(tmp_path.iterdir())
+
+
+def test_people_come_of_assets_which_are_missed_before_any_work(tmp_path):
+    settings = {
+        "train": 2,
+        "val": 0,
+        "test": 0,
+        "seed": 1,
+        "size": 8,
+        "views": 1,
+        "cache": str(tmp_path / "cache"),
+    }
+    data = PeopleData(assets=str(tmp_path / "assets"), **settings)
+    with pytest.raises(DataError, match="found no mpfb2"):
+        data.check_image_size(8)
+    write_assets(tmp_path / "assets")
+    data.check_image_size(8)
+    root = data.prepare()
+    made_by = read_dataset(root).made_by
+    assert made_by["generator"] == "people" and made_by["assets"] == data.generator.facts["assets"]
+    assert (load_character(root, "train-00000").images([0])[..., 3] > 0).any()
+    assert str(tmp_path) not in (root / "dataset.json").read_text()

@@ -16,7 +16,7 @@ def joined(figure_dataset, tmp_path):
     def make(root=figure_dataset, **counts):
         return JoinedData(
             root=str(root),
-            **{"embedded": 0, "shapes": 0, **counts},
+            **{"embedded": 0, "shapes": 0, "people": 0, "assets": None, **counts},
             seed=1,
             size=64,
             views=1,
@@ -28,11 +28,11 @@ def joined(figure_dataset, tmp_path):
 
 def test_what_is_generated_joins_train_and_nothing_is_copied(joined, figure_dataset):
     own = read_dataset(figure_dataset).splits
-    data = joined(shapes=2, embedded=1)
-    assert data.split_sizes() == {name: len(names) + 3 * (name == "train") for name, names in own.items()}
+    data = joined(shapes=1, embedded=1)
+    assert data.split_sizes() == {name: len(names) + 2 * (name == "train") for name, names in own.items()}
     root = data.prepare()
     splits = read_dataset(root).splits
-    assert splits["train"] == (*own["train"], "embedded-00000", "shapes-00000", "shapes-00001")
+    assert splits["train"] == (*own["train"], "embedded-00000", "shapes-00000")
     assert {name: splits[name] for name in ("val", "test")} == {name: own[name] for name in ("val", "test")}
     assert (root / own["val"][0]).samefile(figure_dataset / own["val"][0])
     pictures = [load_character(root, name).images([0]) for name in splits["train"]]
@@ -48,8 +48,12 @@ def test_runs_that_would_not_train_on_it_are_refused(joined):
     for wrong in ({"train": ["val"]}, {"test": "train"}):
         with pytest.raises(ConfigError, match="expected 'train' in train alone"):
             data.check_splits(**{"train": ["train"], "val": "val", "test": "test", **wrong})
-    with pytest.raises(ConfigError, match=r"data\.embedded, data\.shapes: found 0, 0.*data=folder"):
+    with pytest.raises(
+        ConfigError, match=r"data\.embedded, data\.shapes, data\.people: found 0, 0, 0.*data=folder"
+    ):
         joined()
+    with pytest.raises(ConfigError, match=r"data\.assets: not set"):
+        joined(people=1)
 
 
 def test_a_name_that_is_taken_is_named(joined, figure_dataset, tmp_path):

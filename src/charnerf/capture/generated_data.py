@@ -63,8 +63,9 @@ class AbstractGeneratedData(AbstractData):
         return {**self.split_sizes(), "seed": self.seed, "size": self.size, "views": self.views}
 
     def _root(self, settings: dict[str, int]) -> Path:
-        name, version = self.generator.name, self.generator.version
-        facts: dict[str, Any] = {**settings, **self.generator.facts, "generator_version": version}
+        generator = self.generator
+        name, version = generator.name, generator.version
+        facts: dict[str, Any] = {**settings, **generator.facts, "generator_version": version}
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:12]
         return (Path(self.cache).expanduser() if self.cache else user_cache()) / f"{name}-v{version}-{digest}"
 

@@ -2,11 +2,13 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import final
 
 from charnerf.capture.generated_data import AbstractGeneratedData
+from charnerf.capture.people_data import PeopleData
 from charnerf.capture.procedural_data import ProceduralData
 from charnerf.capture.shapes_data import ShapesData
 from charnerf.data.base import AbstractData
@@ -26,6 +28,8 @@ class JoinedData(AbstractData):
         root: Folder of the data set, with dataset.json.
         embedded: Embedded characters that join.
         shapes: Shapes without meaning that join.
+        people: People that join.
+        assets: Folder of what people are made of; None without people.
         seed: Of what is generated.
         size: Side of its pictures, pixels.
         views: Target pictures of each.
@@ -33,20 +37,35 @@ class JoinedData(AbstractData):
     """
 
     def __init__(
-        self, *, root: str, embedded: int, shapes: int, seed: int, size: int, views: int, cache: str | None
+        self,
+        *,
+        root: str,
+        embedded: int,
+        shapes: int,
+        people: int,
+        assets: str | None,
+        seed: int,
+        size: int,
+        views: int,
+        cache: str | None,
     ) -> None:
-        counts = {"embedded": embedded, "shapes": shapes}
+        counts = {"embedded": embedded, "shapes": shapes, "people": people}
         if min(counts.values()) < 0 or not any(counts.values()):
             raise ConfigError(
                 f"data.{', data.'.join(counts)}: found {', '.join(map(str, counts.values()))}, expected 0 or more, and one"
                 " of them more than 0; without, take data=folder."
             )
-        self._folder = FolderData(root=root)
-        kinds: dict[str, type[ProceduralData | ShapesData]] = {
+        if people and not assets:
+            raise ConfigError(
+                "data.assets: not set, expected the folder that people are made of; docs/generators.md."
+            )
+        kinds: dict[str, Callable[..., AbstractGeneratedData]] = {
             "embedded": ProceduralData,
             "shapes": ShapesData,
+            "people": partial(PeopleData, assets=assets or ""),
         }
-        self._generated: dict[str, AbstractGeneratedData] = {
+        self._folder = FolderData(root=root)
+        self._generated = {
             name: kinds[name](train=count, val=0, test=0, seed=seed, size=size, views=views, cache=cache)
             for name, count in counts.items()
             if count

@@ -81,6 +81,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "phase": ("charnerf.schedule.Phase",),
     "data": (
         "charnerf.capture.joined_data.JoinedData",
+        "charnerf.capture.people_data.PeopleData",
         "charnerf.capture.procedural_data.ProceduralData",
         "charnerf.capture.shapes_data.ShapesData",
         "charnerf.data.folder.FolderData",

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 Range = tuple[float, float]
+FRONT = np.array((0.0, -1.0, 0.0))
 _APART, _STRIDING, _TWISTED, _LOOKING_ASIDE, _UNEVEN = 0.45, 0.15, 0.25, 0.2, 0.2  # shares of the figures
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Angles of an arm, degrees: below level, forwards, and how far the elbow turns the forearm up to the front."""
+    """Angles of an arm, degrees: below level, swung forwards, and of the elbow, which bends to the front."""
 
     down: float
     forward: float
@@ -51,6 +52,27 @@ ARM_POSES: dict[str, tuple[float, Range, Range, Range]] = {
     "T": (0.15, (-5.0, 12.0), (-5.0, 5.0), (0.0, 8.0)),
     "holding": (0.1, (45.0, 80.0), (0.0, 50.0), (40.0, 110.0)),
 }
+
+
+def arm_directions(arm: Arm, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (3,) along upper arm and forearm, world frame; side is 1 for the left (+x) and -1 for the right."""
+    upper, turn = _direction(arm.down, arm.forward, side), np.radians(arm.elbow)
+    forwards = FRONT - (FRONT @ upper) * upper
+    length = np.linalg.norm(forwards)
+    if length < 1e-6:  # an arm held straight forwards
+        return upper, upper
+    return upper, np.cos(turn) * upper + np.sin(turn) * forwards / length
+
+
+def leg_direction(leg: Leg, side: float) -> np.ndarray:
+    """Unit vector (3,) from hip to ankle, world frame; side is 1 for the left (+x) and -1 for the right."""
+    return _direction(90.0 - leg.out, leg.forward, side)
+
+
+def _direction(down_deg: float, forward_deg: float, side: float) -> np.ndarray:
+    """Unit vector (3,) to a side, turned below level, then about the axis from side to side to the front."""
+    down, forward = np.radians(down_deg), np.radians(forward_deg)
+    return np.array((side * np.cos(down), -np.sin(down) * np.sin(forward), -np.sin(down) * np.cos(forward)))
 
 
 def draw_stance(rng: np.random.Generator) -> Stance:

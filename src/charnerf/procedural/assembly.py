@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from charnerf.geometry.stances import Arm, Leg, draw_stance
+from charnerf.geometry.stances import arm_directions, draw_stance, leg_direction
 from charnerf.geometry.world import HEIGHT
 from charnerf.procedural.booleans import united
 from charnerf.procedural.palette import HAIRS, LEATHERS, METALS, NEUTRALS, SKINS, pick, vivid
@@ -99,7 +99,9 @@ def _figure(rng: Rng, colors: list[Color]) -> list[Solid]:
     length, thick = rng.uniform(0.45, 0.8), 0.07 * stout * float(rng.uniform(0.7, 1.6))
     for side, arm in zip((1.0, -1.0), stance.arms, strict=True):
         joint = np.array((side * 0.9 * wide, 0.0, shoulders - 1.2 * thick))
-        solids += _limb(rng, colors, [joint, *(joint + length * way for way in _arm_ways(arm, side))], thick)
+        upper, lower = arm_directions(arm, side)
+        elbow = joint + 0.5 * length * upper
+        solids += _limb(rng, colors, [joint, elbow, elbow + 0.5 * length * lower], thick)
     solids = [solid.placed(turn, (0.0, 0.0, 0.0)) for solid in solids]
     if rng.random() < 0.2:
         base = _upright(rng, colors, (0.0, 0.0, 0.55 * hips), (1.1 * wide, 1.1 * deep, 0.55 * hips))
@@ -107,28 +109,9 @@ def _figure(rng: Rng, colors: list[Color]) -> list[Solid]:
     thick *= float(rng.uniform(1.0, 1.6))
     for side, leg in zip((1.0, -1.0), stance.legs, strict=True):
         joint = np.array((side * max(0.5 * wide, thick), 0.0, hips + 0.05))
-        foot = joint + hips * _leg_way(leg, side)
+        foot = joint + hips * leg_direction(leg, side)
         solids += _limb(rng, colors, [joint, 0.5 * (joint + foot), foot], thick)
     return solids + _worn(rng, colors, solids)
-
-
-def _arm_ways(arm: Arm, side: float) -> tuple[Array, Array]:
-    """Where elbow and wrist are from the shoulder, for an arm of length 1."""
-    upper = _way(arm.down, arm.forward, side)
-    lower = np.cos(np.deg2rad(arm.elbow)) * upper + np.sin(np.deg2rad(arm.elbow)) * FRONT
-    return 0.5 * upper, 0.5 * (upper + unit(lower))
-
-
-def _way(down_deg: float, forward_deg: float, side: float) -> Array:
-    """Unit vector to a side, turned below level and to the front."""
-    down, forward = np.deg2rad(down_deg), np.deg2rad(forward_deg)
-    return np.array(
-        (side * np.cos(down) * np.cos(forward), -np.sin(forward), -np.sin(down) * np.cos(forward))
-    )
-
-
-def _leg_way(leg: Leg, side: float) -> Array:
-    return _way(90.0 - leg.out, leg.forward, side)
 
 
 def _limb(rng: Rng, colors: list[Color], joints: list[Array], thick: float) -> list[Solid]:
