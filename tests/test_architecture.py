@@ -23,7 +23,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
     ("scene",),
     ("config", "models", "reconciling", "surfaces", "volume"),
     ("losses",),
-    ("data", "meshing", "procedural"),
+    ("blender", "data", "meshing", "procedural"),
     ("people",),
     ("capture", "evaluation"),
     ("drawings", "foreign"),

@@ -68,7 +68,7 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path):
 def test_commands_end_with_the_signals_status(monkeypatch, capsys, tmp_path):
     from charnerf.capture import dataset
 
-    monkeypatch.setattr(dataset, "expand_mesh_paths", lambda _: ask(signal.SIGTERM))
+    monkeypatch.setattr(dataset, "expand_mesh_paths", lambda *_: ask(signal.SIGTERM))
     (tmp_path / "a.obj").touch()
     assert charnerf(["capture", str(tmp_path / "a.obj"), "-o", str(tmp_path / "set")]) == 143
     assert "stopped by SIGTERM." in capsys.readouterr().err

@@ -3,9 +3,9 @@ import pytest
 import trimesh
 from PIL import Image
 
-from charnerf.capture import dataset
 from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_dataset, capture_scene_to
+from charnerf.capture.renderers import built_in
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.errors import ConfigError, DataError
@@ -49,14 +49,14 @@ def test_one_mesh_that_fails_in_any_way_stops_no_other(tmp_path, monkeypatch):
     Figure(png(Image.fromarray(noise))[:6000]).write(tmp_path / "a_half.glb")
     Figure().write(tmp_path / "b_good.glb")
     Figure().write(tmp_path / "c_huge.glb")
-    read = dataset.load_scene
+    read = built_in.load_scene
 
     def read_or_fail(file, *axes):
         if file.stem == "c_huge":
             raise MemoryError("80 GiB")
         return read(file, *axes)
 
-    monkeypatch.setattr(dataset, "load_scene", read_or_fail)
+    monkeypatch.setattr(built_in, "load_scene", read_or_fail)
     report = capture_dataset([tmp_path], tmp_path / "set", "train", options=TINY, processes=1)
     assert report.captured == ("b_good",)
     half, huge = report.failed

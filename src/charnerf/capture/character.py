@@ -8,7 +8,9 @@ import numpy as np
 import trimesh
 
 from charnerf.capture.lights import AbstractLight, Unlit
-from charnerf.capture.studio import EDGE_SUBSAMPLES, SUBSAMPLES, Studio
+from charnerf.capture.renderers.base import AbstractRenderer
+from charnerf.capture.renderers.built_in import BuiltIn
+from charnerf.capture.studio import Studio
 from charnerf.data.characters import CharacterPictures
 from charnerf.errors import ConfigError
 from charnerf.geometry.cameras import fibonacci_hemisphere
@@ -27,8 +29,7 @@ class CaptureOptions:
         sources: Projection of the source views.
         depth: Whether to keep depth pictures.
         light: How the surface is lit.
-        subsamples: Rays a pixel.
-        edge_subsamples: Rays for each pixel that the silhouette crosses.
+        renderer: What takes the pictures.
     """
 
     views: int = 48
@@ -36,8 +37,7 @@ class CaptureOptions:
     sources: Literal["orthographic", "pinhole"] = "orthographic"
     depth: bool = False
     light: AbstractLight = field(default_factory=Unlit)
-    subsamples: int = SUBSAMPLES
-    edge_subsamples: int = EDGE_SUBSAMPLES
+    renderer: AbstractRenderer = field(default_factory=BuiltIn)
 
     def __post_init__(self) -> None:
         """Check the options.
@@ -45,7 +45,7 @@ class CaptureOptions:
         Raises:
             ConfigError: If one is out of its range.
         """
-        for name, least in (("views", 1), ("size", 8), ("subsamples", 1), ("edge_subsamples", 1)):
+        for name, least in (("views", 1), ("size", 8)):
             if getattr(self, name) < least:
                 raise ConfigError(f"{name}: found {getattr(self, name)}, expected at least {least}.")
         if self.sources not in ("orthographic", "pinhole"):
@@ -73,16 +73,15 @@ def capture_character(
         Pictures with their cameras: pinhole targets, and the source views front, side, back.
 
     Raises:
-        DataError: If the scene has no triangles.
+        DataError: If the scene has no triangles, or its pictures can not be taken.
     """
     surface = scene if isinstance(scene, SurfaceMesh) else surface_of_scene(scene)
     radius, size = surface.framing_radius, options.size
     targets = framing_cameras(fibonacci_hemisphere(options.views), radius=radius, size=size)
     sources = source_cameras(radius=radius, size=size, orthographic=options.sources == "orthographic")
-    studio = Studio(
-        surface, options.light, subsamples=options.subsamples, edge_subsamples=options.edge_subsamples
+    shots, source_shots = options.renderer.shoot(
+        surface, (targets, sources), options.light, depth=options.depth
     )
-    shots, source_shots = studio.shoot(targets), studio.shoot(sources)
     pictures = CharacterPictures(
         cameras=targets,
         images=np.stack([shot.rgba for shot in shots]),

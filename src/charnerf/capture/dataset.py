@@ -1,5 +1,6 @@
 """Meshes to characters of a data set, in parallel processes; each is written aside and renamed."""
 
+import time
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
@@ -14,9 +15,10 @@ import trimesh
 
 from charnerf.capture import unfinished
 from charnerf.capture.character import CaptureOptions, capture_character
-from charnerf.capture.meshes import SUFFIXES, axes_rotation, file_axes, load_scene
+from charnerf.capture.meshes import check_axes
 from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
+from charnerf.capture.renderers.base import AbstractRenderer
 from charnerf.capture.variants import SEPARATOR, variant
 from charnerf.data.characters import CharacterPictures, remove_partial_characters, write_character
 from charnerf.data.layout import add_to_split, check_name
@@ -25,7 +27,6 @@ from charnerf.files import check_folder
 from charnerf.interruption import held
 from charnerf.progress import Progress
 from charnerf.surfaces.mesh_files import write_surface_mesh
-from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 VARIED_SHARE = 0.7  # of drawn copies: seven of ten variants hold their arms down, half of turnarounds do
@@ -43,11 +44,20 @@ class CaptureReport:
         captured: Names of the characters that were put into the data set, in the order given.
         failed: One message for each mesh that could not be captured.
         skipped: Names that were there already: the same capture was interrupted before.
+        notes: What was simplified or left out of which character.
+        seconds: That all of it took.
     """
 
     captured: tuple[str, ...]
     failed: tuple[str, ...]
     skipped: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def characters_a_second(self) -> float:
+        """How many were captured a second."""
+        return len(self.captured) / self.seconds if self.seconds > 0.0 else 0.0
 
 
 def capture_dataset(
@@ -86,16 +96,16 @@ def capture_dataset(
 
     Raises:
         DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set or can not be written to.
-        ConfigError: Before any work, if up and facing are no axes.
+        ConfigError, DependencyError: Before any work, if up and facing are no axes, or the renderer is not here.
     """
-    options, files, root = options or CaptureOptions(), expand_mesh_paths(mesh_paths), Path(root)
-    _check_call(files, root, split, up, facing)
-    items = _items(files, variants, swaps, drawn)
+    options, root = options or CaptureOptions(), Path(root)
+    files = expand_mesh_paths(mesh_paths, options.renderer.suffixes)
+    _check_call(files, root, split, options.renderer, up, facing)
+    items = _items(files, options.renderer, variants, swaps, drawn)
     note = unfinished.note_of(root, files, split, made_by(options), up, facing, variants, swaps, drawn, seed)
     skipped = _make_room(root, split, items, note)
-    donors = sorted(files)
     work = partial(
-        _capture_item, root=root, options=options, donors=donors, draw=draw, up=up, facing=facing, seed=seed
+        _capture_item, root=root, options=options, donors=files, draw=draw, up=up, facing=facing, seed=seed
     )
     add = partial(add_to_split, root, split, made_by=made_by(options))
     with unfinished.noted(note, [item.name for item in items]):
@@ -141,11 +151,12 @@ def made_by(options: CaptureOptions) -> dict[str, Any]:
         "sources": options.sources,
         "light": type(options.light).__name__,
         "depth": options.depth,
+        **options.renderer.facts(),
     }
 
 
-def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
-    """Mesh files, folders replaced by the mesh files in them, sorted.
+def expand_mesh_paths(mesh_paths: Iterable[str | Path], suffixes: Sequence[str]) -> list[Path]:
+    """Mesh files, folders replaced by the files of some suffixes in them, sorted.
 
     Raises:
         DataError: If a path is missing, a folder holds no mesh, or nothing was given.
@@ -153,10 +164,10 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path]) -> list[Path]:
     files: list[Path] = []
     for path in map(Path, mesh_paths):
         if path.is_dir():
-            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes)
             if not inside:
                 raise DataError(
-                    f"{path}: found no mesh in this folder, expected {', '.join(SUFFIXES)} files."
+                    f"{path}: found no mesh in this folder, expected {', '.join(suffixes)} files."
                 )
             files += inside
         elif path.exists():
@@ -173,28 +184,48 @@ class _Item:
     """A mesh file, as it is (0), one of its variants (""), exchanges of parts ("s") or drawn copies ("d")."""
 
     file: Path
+    character: str
     number: int = 0
     kind: str = ""
 
     @property
     def name(self) -> str:
-        return f"{self.file.stem}{SEPARATOR}{self.kind}{self.number}" if self.number else self.file.stem
+        return f"{self.character}{SEPARATOR}{self.kind}{self.number}" if self.number else self.character
 
 
-def _items(files: Sequence[Path], variants: int, swaps: int, drawn: int) -> list[_Item]:
+@dataclass(frozen=True)
+class _Outcome:
+    """What is wrong with an item, if it is, and what is to be said about it."""
+
+    failure: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+def _items(
+    files: Sequence[Path], renderer: AbstractRenderer, variants: int, swaps: int, drawn: int
+) -> list[_Item]:
     """What is captured: the files, or so many variants, exchanges and drawn copies of each."""
     items = []
     for file in files:
+        name = renderer.name_of(file)
         for kind, count in (("", variants), ("s", swaps), ("d", drawn)):
-            items += [_Item(file, number, kind) for number in range(1, count + 1)]
-    return items or [_Item(file) for file in files]
+            items += [_Item(file, name, number, kind) for number in range(1, count + 1)]
+    return items or [_Item(file, renderer.name_of(file)) for file in files]
 
 
-def _check_call(files: Sequence[Path], root: Path, split: str, up: str | None, facing: str | None) -> None:
+def _check_call(
+    files: Sequence[Path],
+    root: Path,
+    split: str,
+    renderer: AbstractRenderer,
+    up: str | None,
+    facing: str | None,
+) -> None:
     check_name("split", split)
     check_folder(root)
-    for suffix in {file.suffix.lower() for file in files} & set(SUFFIXES):
-        axes_rotation(*file_axes(suffix, up, facing))
+    for suffix in {file.suffix.lower() for file in files} & set(renderer.suffixes):
+        check_axes(suffix, up, facing)
+    renderer.check()
 
 
 def _make_room(root: Path, split: str, items: Sequence[_Item], note: Path) -> frozenset[str]:
@@ -212,7 +243,7 @@ def _make_room(root: Path, split: str, items: Sequence[_Item], note: Path) -> fr
 
 def _capture_items(
     items: Sequence[_Item],
-    work: Callable[[_Item], str | None],
+    work: Callable[[_Item], _Outcome],
     add: Callable[[list[str]], object],
     *,
     root: Path,
@@ -221,27 +252,34 @@ def _capture_items(
 ) -> CaptureReport:
     """Capture in parallel; `work` gives what is wrong with an item, `add` puts the others into the data set."""
     items = [item for item in items if item.name not in skipped]
-    messages: dict[_Item, str | None] = {}
+    outcomes: dict[_Item, _Outcome] = {}
+    began = time.perf_counter()
     try:
-        with Progress("capture") as progress:
-            step = progress.counter(len(items))
-            with closing(in_processes(work, items, processes)) as results:
-                for item, message in results:
-                    if message is not None:
-                        progress.say(f"not captured: {message}")
-                    with held():
-                        if message is None:
-                            add([item.name])
-                        messages[item] = message
-                    step()
+        with (
+            Progress("capture") as progress,
+            closing(in_processes(work, items, processes)) as results,
+        ):
+            for item, outcome in results:
+                for note in outcome.notes:
+                    progress.say(f"{item.name}: {note}")
+                if outcome.failure is not None:
+                    progress.say(f"not captured: {outcome.failure}")
+                with held():
+                    if outcome.failure is None:
+                        add([item.name])
+                    outcomes[item] = outcome
+                pace = len(outcomes) / (time.perf_counter() - began)
+                progress.update(len(outcomes) / len(items), f"{pace:.3g} characters a second")
     finally:  # interrupted: what was written meanwhile belongs to the data set too
-        unlisted = [item.name for item in items if item not in messages and (root / item.name).is_dir()]
+        unlisted = [item.name for item in items if item not in outcomes and (root / item.name).is_dir()]
         if unlisted:
             add(unlisted)
     return CaptureReport(
-        captured=tuple(item.name for item in items if messages[item] is None),
-        failed=tuple(message for item in items if (message := messages[item]) is not None),
+        captured=tuple(item.name for item in items if outcomes[item].failure is None),
+        failed=tuple(failure for item in items if (failure := outcomes[item].failure) is not None),
         skipped=tuple(sorted(skipped)),
+        notes=tuple(f"{item.name}: {note}" for item in items for note in outcomes[item].notes),
+        seconds=time.perf_counter() - began,
     )
 
 
@@ -255,15 +293,17 @@ def _capture_item(
     up: str | None,
     facing: str | None,
     seed: int,
-) -> str | None:
-    """Capture a file or what is made of it and of donors; the message of what is wrong with it, or None."""
+) -> _Outcome:
+    """Capture a file or what is made of it and of donors."""
     try:
-        surface = surface_of_scene(load_scene(item.file, up, facing))
+        read = partial(options.renderer.read, up=up, facing=facing)
+        character = read(item.file)
+        surface = character.surface
         drawn_from = [seed, zlib.crc32(item.file.stem.encode()), item.number]
         rng = np.random.default_rng([*drawn_from, *_STREAMS[item.kind]])
         if item.kind == "s":
-            others = [donors[index] for index in rng.integers(len(donors), size=2)]
-            parts = [surface_of_scene(load_scene(other, up, facing)) for other in others]
+            others = [sorted(donors)[index] for index in rng.integers(len(donors), size=2)]
+            parts = [read(other).surface for other in others]
             surface = swap_parts([surface, *parts], rng)
         elif item.number and (item.kind == "" or rng.random() < VARIED_SHARE):
             surface = variant(surface, rng)
@@ -275,9 +315,11 @@ def _capture_item(
             draw=partial(draw, rng=rng) if draw and item.kind == "d" else None,
         )
     except CharNeRFError as err:
-        return str(err)
+        return _Outcome(failure=str(err))
     except OSError:  # of the data set's own disk, which all share: readers make DataErrors of theirs
         raise
     except Exception as err:  # whatever one mesh makes fail stops no other
-        return f"{item.file}: can not be captured ({type(err).__name__}: {err}); export it again."
-    return None
+        return _Outcome(
+            failure=f"{item.file}: can not be captured ({type(err).__name__}: {err}); export it again."
+        )
+    return _Outcome(notes=character.notes)

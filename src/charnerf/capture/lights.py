@@ -7,7 +7,13 @@ import numpy as np
 
 
 class AbstractLight(ABC):
-    """A light changes the colours of surface points before they are averaged over a pixel."""
+    """A light changes the colours of surface points before they are averaged over a pixel.
+
+    Attributes:
+        constant: Share of it that comes from everywhere, in [0, 1]; the rest comes from the camera.
+    """
+
+    constant: float
 
     @abstractmethod
     def lit(self, rgb: np.ndarray, normals: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -24,6 +30,8 @@ class AbstractLight(ABC):
 class Unlit(AbstractLight):
     """Base colours as they are."""
 
+    constant = 1.0
+
     def lit(self, rgb: np.ndarray, normals: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Return the base colours."""
         return rgb
@@ -35,9 +43,9 @@ class Headlight(AbstractLight):
 
     def __init__(self, constant: float = 0.5):
         """Set the share of constant light, in [0, 1]."""
-        self._constant = constant
+        self.constant = constant
 
     def lit(self, rgb: np.ndarray, normals: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Darken what is seen at a slant."""
         facing = np.abs((normals * directions).sum(axis=-1, keepdims=True))
-        return rgb * (self._constant + (1.0 - self._constant) * facing)
+        return rgb * (self.constant + (1.0 - self.constant) * facing)

@@ -16,12 +16,14 @@ from charnerf.surfaces.gltf_document import GltfDocument, read_gltf
 from charnerf.surfaces.plain_gltf import make_plain
 from charnerf.surfaces.scene_mesh import COLORS_KEY, FACTOR_KEY
 
+GLTF_SUFFIXES = (".glb", ".gltf", ".vrm")
+
 
 def read_scene(path: Path) -> trimesh.Scene:
     """Read a mesh file; nothing outside its folder is opened.
 
     Args:
-        path: GLB, glTF, OBJ, PLY, STL, or what else trimesh reads.
+        path: GLB, glTF, VRM, OBJ, PLY, STL, or what else trimesh reads.
 
     Raises:
         DataError: If it can not be read, needs what is not supported, or names a file or picture that is missing or broken.
@@ -41,11 +43,40 @@ def read_scene(path: Path) -> trimesh.Scene:
     return scene
 
 
+def check_files(path: Path) -> None:
+    """Check what a file names for another program that will open it: nothing outside its folder, no broken glTF.
+
+    Raises:
+        DataError: If something is missing, lies elsewhere, or can not be read.
+    """
+    try:
+        neighbour = partial(_neighbour, OwnFolder(path, []))
+        if path.suffix.lower() in GLTF_SUFFIXES:
+            make_plain(read_gltf(path, neighbour), neighbour)
+        elif path.suffix.lower() == ".obj":
+            plain_obj.used_materials(read_whole(path), neighbour)
+    except (KeyError, TypeError, ValueError, IndexError) as err:
+        message = str(err)
+        raise DataError(
+            message if message.startswith(f"{path}:") else f"{path}: {message or type(err).__name__}"
+        ) from err
+
+
+def is_vrm_0(path: Path) -> bool:
+    """Whether a file is a VRM of version 0, whose characters face the other way."""
+    if path.suffix.lower() != ".vrm":
+        return False
+    try:
+        return "VRM" in read_gltf(path, lambda _: b"").tree.get("extensions", {})
+    except (DataError, KeyError, TypeError, ValueError):
+        return False  # who reads it says what is wrong
+
+
 def _read_scene(path: Path) -> trimesh.Scene:
     suffix, refused, document = path.suffix.lower(), list[str](), None
     folder = OwnFolder(path, refused)
     neighbour = partial(_neighbour, folder)
-    if suffix in (".glb", ".gltf"):
+    if suffix in GLTF_SUFFIXES:
         document = read_gltf(path, neighbour)
         make_plain(document, neighbour)
         content, suffix = document.to_glb(), ".glb"

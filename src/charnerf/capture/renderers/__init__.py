@@ -1,0 +1,1 @@
+"""What reads a character's file and takes its pictures."""
