@@ -51,7 +51,7 @@ class Queue:
         if session.job is not None and session.job.is_active:
             raise ConfigError("This page's character is being made already: cancel it, or wait for it.")
         in_order(session.figures)
-        session.job = Job(session, list(session.figures), plan)
+        session.job = Job(session.next_number(), session, list(session.figures), plan)
         self.waiting.append(session.job)
         self._next()
 

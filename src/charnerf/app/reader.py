@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, final
 
 from charnerf.app.background import Background
-from charnerf.app.figures import LEFT_OUT, Figure, in_order
+from charnerf.app.figures import LEFT_OUT, Figure, in_order, view_text
 from charnerf.app.limits import Limits
 from charnerf.app.session import GivenPicture, Session, thumbnail_of
 from charnerf.app.worker import Ended, Refused, Worker
@@ -119,7 +119,8 @@ class Reader:
             session.pictures.remove(picture)
             session.figures = [one for one in session.figures if one.file != picture.file]
             shutil.rmtree(picture.file.parent, ignore_errors=True)
-            picture.thumbnail.unlink(missing_ok=True)
+            for small in (picture.thumbnail, *session.folder.glob(f"{number}-*.png")):
+                small.unlink(missing_ok=True)
         self.read(session)
 
     def edit(
@@ -135,9 +136,10 @@ class Reader:
         Raises:
             DataError: If a view has no such name.
         """
-        for view, _ in changes.values():
-            if view != LEFT_OUT:
-                viewpoint(view)
+        changes = {
+            number: (view if view == LEFT_OUT else view_text(viewpoint(view)), is_mirrored)
+            for number, (view, is_mirrored) in changes.items()
+        }
         session.figures = [
             replace(
                 one,

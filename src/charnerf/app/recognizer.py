@@ -44,20 +44,20 @@ class Recognizer:
         return self.size
 
     def examine(self, file: Path, title: str, thumbnail: Path, most_pixels: int) -> Found:
-        """Find the figures of a picture, and write a small one of it.
+        """Find the figures of a picture, and write a small one of it and of each figure: N.png, N-0.png, N-1.png and so on.
 
         Raises:
             DataError: If it can not be used.
         """
         _check_pixels(file, title, most_pixels)
         drawing = load_drawing(file)
-        small = Image.fromarray(to_bytes(drawing.rgba))
-        small.thumbnail((THUMBNAIL, THUMBNAIL))
-        small.save(thumbnail, format="PNG")
+        _save_small(drawing, thumbnail)
         sheet = _sheet(file)
         if sheet is None:
             cut_out(drawing)  # says what is wrong with it now, not later
             return Found(((0.0, 0.0, 1.0, 1.0),), False)
+        for index, figure in enumerate(sheet.figures):
+            _save_small(figure.drawing, thumbnail.with_stem(f"{thumbnail.stem}-{index}"))
         height, width = drawing.rgba.shape[:2]
         boxes = [one.box for one in sheet.figures]
         return Found(tuple((a / width, b / height, c / width, d / height) for a, b, c, d in boxes), True)
@@ -155,6 +155,13 @@ def _check_pixels(file: Path, title: str, most: int) -> None:
             f"{title}: found {width} x {height} pixels, expected at most {most / 1e6:.0f} million; a side of 1000 to 2000 is"
             " plenty. Reduce the picture."
         )
+
+
+def _save_small(drawing: Drawing, file: Path) -> None:
+    """Write a small picture of a drawing."""
+    small = Image.fromarray(to_bytes(drawing.rgba))
+    small.thumbnail((THUMBNAIL, THUMBNAIL))
+    small.save(file)
 
 
 @lru_cache(maxsize=8)

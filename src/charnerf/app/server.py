@@ -12,7 +12,7 @@ from aiohttp import web
 
 from charnerf.app.examples import EXAMPLES, example_files
 from charnerf.app.guard import HEADERS, refusal
-from charnerf.app.session import Session
+from charnerf.app.session import Session, thumbnail_of
 from charnerf.app.settings import form, read_plan
 from charnerf.app.studio import Studio
 from charnerf.app.worker import Refused
@@ -60,6 +60,7 @@ def make_app(studio: Studio, names: Collection[str]) -> web.Application:
     app.router.add_post(f"{session}/cancel", _cancel)
     app.router.add_get(f"{session}/look", _look)
     app.router.add_get(f"{session}/pictures/{{number}}", _thumbnail)
+    app.router.add_get(f"{session}/figures/{{number}}", _figure)
     app.router.add_get(f"{session}/read/{{folder}}/{{name}}", _read_picture)
     app.router.add_get(f"{session}/made/{{folder}}/{{name}}", _made_file)
     app.cleanup_ctx.append(_closing)
@@ -300,6 +301,16 @@ async def _thumbnail(request: web.Request) -> web.StreamResponse:
         if picture.number == number:
             return _file(picture.thumbnail)
     raise web.HTTPNotFound(text="This picture is not there any more.")
+
+
+async def _figure(request: web.Request) -> web.StreamResponse:
+    """A small picture of a figure as it came."""
+    session, number = _session(request), _number(request.match_info["number"])
+    for figure in session.figures:
+        if figure.number == number:
+            small = thumbnail_of(figure.file)
+            return _file(small if figure.part is None else small.with_stem(f"{small.stem}-{figure.part}"))
+    raise web.HTTPNotFound(text="This figure is not there any more.")
 
 
 async def _read_picture(request: web.Request) -> web.StreamResponse:

@@ -48,6 +48,7 @@ class Job:
     """A character to be made.
 
     Attributes:
+        number: Of the session's.
         session: Whose.
         figures: Its drawings, as they were when it was asked for.
         plan: What is made.
@@ -57,6 +58,7 @@ class Job:
         problem: Why it failed.
     """
 
+    number: int
     session: "Session"
     figures: list[Figure]
     plan: Plan
@@ -166,7 +168,13 @@ class Session:
         }
 
     def _job(self, job: Job, place: int | None) -> dict[str, Any]:
-        return {"state": job.state, "ahead": place, "problem": job.problem, **job.moment}
+        return {
+            "number": job.number,
+            "state": job.state,
+            "ahead": place,
+            "problem": job.problem,
+            **job.moment,
+        }
 
     def _product(self, product: Product) -> dict[str, Any]:
         assert self.made_in is not None  # it lies there

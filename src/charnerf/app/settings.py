@@ -129,7 +129,7 @@ def _value(field: Field, value: Any) -> Any:
     """A field's value, checked."""
     if field.kind == "switch" and isinstance(value, bool):
         return value
-    if field.kind == "choice" and value in dict(field.choices):
+    if field.kind == "choice" and isinstance(value, str) and value in dict(field.choices):
         return value
     if field.kind == "text" and isinstance(value, str) and len(value) <= 100:
         return value

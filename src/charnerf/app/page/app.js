@@ -246,8 +246,8 @@ function makeCard(number) {
         tool("mirror", "Mirror", () => change(number, { mirrored: !figureOf(number).mirrored })),
         tool("swap", "Swap", () => swap(number)),
         tool("drop", "Leave out", () => change(number, { view: figureOf(number).view === LEFT_OUT ? freeView() : LEFT_OUT })),
-        tool("before", "As drawn", (event) => compare(number, event.target)),
-        tool("remove", "Remove", () => removePicture(figureOf(number).picture)))));
+        tool("before", "As drawn", (event) => compare(number, event.target)))),
+    tool("remove", "×", () => removePicture(figureOf(number).picture)));
 }
 
 function fillCard(card, figure) {
@@ -298,10 +298,7 @@ function showPicture(card, figure, read) {
     frame.replaceChildren(make("img", { src: at(`read/${key}`), alt: `${read.view}, cut out: its outline is red${file === read.mended ? ", what moved orange" : ""}` }));
     return;
   }
-  const [left, top, right, bottom] = figure.box;
-  const image = make("img", { class: "crop", src: at(`pictures/${figure.picture}`), alt: nameOf(figure) });
-  image.style.objectViewBox = `inset(${100 * top}% ${100 * (1 - right)}% ${100 * (1 - bottom)}% ${100 * left}%)`;
-  frame.replaceChildren(image);
+  frame.replaceChildren(make("img", { class: "crop", src: at(`figures/${figure.number}`), alt: nameOf(figure) }));
 }
 
 function compare(number, button) {
@@ -325,7 +322,7 @@ function choose(number, view) {
   const card = document.querySelector(`.figure[data-number="${number}"]`);
   if (view !== OTHER) return change(number, { view });
   card.querySelector(".angles").hidden = false;
-  card.querySelector("[name=azimuth]").focus();
+  card.querySelector("[name=azimuth]").select();
 }
 
 function angles(number) {
@@ -526,6 +523,10 @@ $("refine").onclick = () => {
   $("field-refine").value = 30;
   build();
 };
+$("anew").onclick = () => attempt(async () => {
+  for (const { number } of state.pictures) await ask("DELETE", at(`pictures/${number}`));
+  $("choose").querySelector("input").focus();
+});
 $("cancel").onclick = () => attempt(() => ask("POST", at("cancel")), "job-problem");
 $("turn").onclick = () => turn(!turning);
 for (const name of ["azimuth", "elevation"]) $(name).addEventListener("input", () => {
