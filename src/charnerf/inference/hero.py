@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 import torch
@@ -131,6 +131,24 @@ class Hero:
             raise ConfigError(f"tolerance: found {tolerance}, expected a number from 0 on.")
         renderer = BakedRenderer(**self.renderer.settings, tolerance=tolerance)
         return replace(self, scene=renderer.prepared(self.scene, on_share), renderer=renderer)
+
+    def view(self, *, size: int = 256) -> Any:
+        """A widget for a notebook that shows the character from where its sliders say; baked first, where it is not.
+
+        Args:
+            size: Side of the picture, pixels.
+
+        Raises:
+            ConfigError: If the size is below 1.
+            DependencyError: If ipywidgets is missing.
+        """
+        from charnerf.inference.notebook import turning
+
+        baked = self if isinstance(self.renderer, BakedRenderer) else self.baked()
+        return turning(
+            lambda azimuth, elevation: baked.render(azimuth_deg=azimuth, elevation_deg=elevation, size=size),
+            size=size,
+        )
 
     def lods(
         self,
