@@ -90,6 +90,7 @@ def test_every_line_is_of_a_known_program() -> None:
                 "benchmarks.soak",
                 "benchmarks.plan",
                 "docs",
+                "docs.pictures",
                 "docs.take",
             )
             or (ROOT / program).is_file()
@@ -154,6 +155,21 @@ def test_more_machines_work_as_typed(line: str, figure_dataset: Path, tmp_path: 
     assert len(cells) >= 2 and {json.loads(file.read_text())["state"] for file in cells} == {"done"}
     (grid,) = {file.parent.parent for file in cells}
     assert (grid / "report.md").is_file() and (grid / "front.csv").is_file() == ("search" in line)
+
+
+@pytest.mark.slow
+def test_the_tutorial_works_as_typed(tmp_path: Path) -> None:
+    """Line by line, in one folder."""
+    for line in lines_of(ROOT / "docs" / "tutorial.md"):
+        words = [sys.executable, "-m", *shlex.split(line)]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+    mesh = trimesh.load_mesh(tmp_path / "hero/mesh.glb")
+    assert mesh.extents.max() == pytest.approx(2.0, rel=0.01) and (tmp_path / "hero/report.html").is_file()
+    assert len(list((tmp_path / "levels").glob("*_LOD[0-9].glb"))) >= 3
+    grid = tmp_path / "outputs" / "first"
+    states = [json.loads(file.read_text())["state"] for file in grid.glob("*/cell.json")]
+    assert states == 4 * ["done"] and (grid / "report.html").is_file()
 
 
 @pytest.fixture(scope="module")

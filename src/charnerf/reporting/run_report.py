@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from charnerf.reporting.blocks import Block, Bullets, Code, Heading, Picture, Table, Text
+from charnerf.pictures import open_picture
+from charnerf.reporting.blocks import Block, Bullets, Code, Heading, Picture, SideBySide, Table, Text
 from charnerf.reporting.document import write_report
 from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, metric_cells, seconds_text
 from charnerf.reporting.meshes import run_meshes
@@ -13,6 +14,7 @@ from charnerf.reporting.run_files import read_curve, read_metrics
 from charnerf.wording import counted
 
 MAX_SHEETS = 12
+MOST_WIDTH = 420  # pixels of pictures that stand side by side
 
 
 def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> Path:
@@ -36,12 +38,12 @@ def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> P
     sheets = _sheets(folder, worst_first, metrics)
     shown = _best_middle_worst(sheets)
     if shown:
-        blocks += [Heading("Best, middle, worst"), *(sheets[name] for name in shown)]
+        blocks += [Heading("Best, middle, worst"), *_beside([sheets[name] for name in shown])]
     blocks += run_meshes(folder)
     blocks += [*_curve(folder), *_angles(folder, metrics), *_characters(worst_first, metrics)]
     rest = [sheets[name] for name in sheets if name not in shown][: MAX_SHEETS - len(shown)]
     if rest:
-        blocks += [Heading("More characters"), *rest]
+        blocks += [Heading("More characters"), *_beside(rest)]
     blocks += [*more, *_spent(metrics), *_missing(metrics), *_go_on(folder, metrics)]
     config = folder / "config.yaml"
     if config.is_file():
@@ -107,6 +109,15 @@ def _sheets(folder: Path, names: Sequence[str], metrics: Mapping[str, Any]) -> d
     return sheets
 
 
+def _beside(pictures: Sequence[Picture]) -> list[Block]:
+    """Pictures beside one another where each has room for its labels, else below one another."""
+    widths = []
+    for one in pictures:
+        with open_picture(one.path) as picture:
+            widths.append(picture.width)
+    return [SideBySide(pictures)] if max(widths) <= MOST_WIDTH else list(pictures)
+
+
 def _best_middle_worst(worst_first: Mapping[str, Picture]) -> list[str]:
     """Three of the names, or as many as there are."""
     names = list(worst_first)
@@ -153,7 +164,11 @@ def _spent(metrics: Mapping[str, Any]) -> list[Block]:
     names = {"rays": "rays", "samples": "samples on rays", "grid_cells": "grid cells of the mesh"}
     left = [f"{title}: {cell(shares.get(key), '{:.1%}')} not evaluated" for key, title in names.items()]
     place = metrics.get("environment", {})
-    where = [f"{key}: {value}" for key, value in place.items() if not key.endswith("_reason")]
+    where = [
+        f"{key.replace('_', ' ')}: {_plain(value)}"
+        for key, value in place.items()
+        if not key.endswith("_reason")
+    ]
     return [
         Heading("Time and memory"),
         Table(["stage", "time (median)", "peak memory, MiB"], rows),
@@ -163,6 +178,15 @@ def _spent(metrics: Mapping[str, Any]) -> list[Block]:
         Heading("Where this was measured"),
         Bullets(where),
     ]
+
+
+def _plain(value: Any) -> str:
+    """A fact of the environment in words."""
+    return (
+        ", ".join(f"{name}: {one}" for name, one in value.items())
+        if isinstance(value, Mapping)
+        else str(value)
+    )
 
 
 def _missing(metrics: Mapping[str, Any]) -> list[Block]:
