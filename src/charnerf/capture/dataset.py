@@ -2,7 +2,7 @@
 
 import time
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +15,7 @@ import trimesh
 
 from charnerf.capture import unfinished
 from charnerf.capture.character import CaptureOptions, capture_character
+from charnerf.capture.dressing import dress
 from charnerf.capture.meshes import check_axes
 from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
@@ -30,7 +31,7 @@ from charnerf.surfaces.mesh_files import write_surface_mesh
 from charnerf.surfaces.surface_mesh import SurfaceMesh
 
 VARIED_SHARE = 0.7  # of drawn copies: seven of ten variants hold their arms down, half of turnarounds do
-_STREAMS = {"": (), "s": (1,), "d": (2,)}  # further seeds of what each kind is drawn from
+_STREAMS = {"": (), "s": (1,), "d": (2,), "w": (3,)}  # further seeds of what each kind is drawn from
 
 DrawSources = Callable[..., CharacterPictures]
 """Called with pictures, surface and rng, returns the pictures with drawings for source views."""
@@ -70,12 +71,13 @@ def capture_dataset(
     facing: str | None = None,
     variants: int = 0,
     swaps: int = 0,
+    dressed: int = 0,
     drawn: int = 0,
     draw: DrawSources | None = None,
     seed: int = 0,
     processes: int | None = None,
 ) -> CaptureReport:
-    """Capture meshes into one split of a data set, new or there; the same call goes on with one that was interrupted.
+    """Capture meshes into one split of a data set, new or there; bad ones stop no other, the same call goes on when interrupted.
 
     Args:
         mesh_paths: Mesh files, and folders of them (not deeper); a character's name is its file's stem.
@@ -86,13 +88,11 @@ def capture_dataset(
         facing: Signed axis that the characters face; None for each format's own.
         variants: Of each mesh, captured instead of it (capture/variants.py): NAME+1, NAME+2, ...
         swaps: Of each mesh's body with other meshes' heads and legs, instead of it (capture/part_swaps.py): NAME+s1, ...
+        dressed: Variants of each mesh that wear solids, instead of it (capture/dressing.py): NAME+w1, ...
         drawn: Copies of each mesh, seven of ten varied, whose source views are drawings, instead of it: NAME+d1, ...
         draw: Makes their drawings.
-        seed: What variants, swaps and drawings are drawn from; the same seed gives the same ones, however many.
+        seed: What variants, swaps, clothes and drawings are drawn from; the same seed gives the same ones, however many.
         processes: Worker processes; None for one a core.
-
-    Returns:
-        What was captured, and what failed: a bad mesh does not stop the others.
 
     Raises:
         DataError: Before any work, if there is no mesh, a name is taken, or the folder is no data set or can not be written to.
@@ -101,8 +101,8 @@ def capture_dataset(
     options, root = options or CaptureOptions(), Path(root)
     files = expand_mesh_paths(mesh_paths, options.renderer.suffixes)
     _check_call(files, root, split, options.renderer, up, facing)
-    items = _items(files, options.renderer, variants, swaps, drawn)
-    note = unfinished.note_of(root, files, split, made_by(options), up, facing, variants, swaps, drawn, seed)
+    items = _items(files, options.renderer, {"": variants, "s": swaps, "w": dressed, "d": drawn})
+    note = unfinished.note_of(root, files, split, made_by(options), up, facing, items, seed)
     skipped = _make_room(root, split, items, note)
     work = partial(
         _capture_item, root=root, options=options, donors=files, draw=draw, up=up, facing=facing, seed=seed
@@ -181,7 +181,7 @@ def expand_mesh_paths(mesh_paths: Iterable[str | Path], suffixes: Sequence[str])
 
 @dataclass(frozen=True)
 class _Item:
-    """A mesh file, as it is (0), one of its variants (""), exchanges of parts ("s") or drawn copies ("d")."""
+    """A mesh file, as it is (0), one of its variants (""), exchanges of parts ("s"), dressed ("w") or drawn copies ("d")."""
 
     file: Path
     character: str
@@ -201,14 +201,12 @@ class _Outcome:
     notes: tuple[str, ...] = ()
 
 
-def _items(
-    files: Sequence[Path], renderer: AbstractRenderer, variants: int, swaps: int, drawn: int
-) -> list[_Item]:
-    """What is captured: the files, or so many variants, exchanges and drawn copies of each."""
+def _items(files: Sequence[Path], renderer: AbstractRenderer, counts: Mapping[str, int]) -> list[_Item]:
+    """What is captured: the files, or so many of each kind that is made of each."""
     items = []
     for file in files:
         name = renderer.name_of(file)
-        for kind, count in (("", variants), ("s", swaps), ("d", drawn)):
+        for kind, count in counts.items():
             items += [_Item(file, name, number, kind) for number in range(1, count + 1)]
     return items or [_Item(file, renderer.name_of(file)) for file in files]
 
@@ -305,8 +303,10 @@ def _capture_item(
             others = [sorted(donors)[index] for index in rng.integers(len(donors), size=2)]
             parts = [read(other).surface for other in others]
             surface = swap_parts([surface, *parts], rng)
-        elif item.number and (item.kind == "" or rng.random() < VARIED_SHARE):
+        elif item.number and (item.kind != "d" or rng.random() < VARIED_SHARE):
             surface = variant(surface, rng)
+        if item.kind == "w":
+            surface = dress(surface, rng)
         capture_scene_to(
             root,
             item.name,

@@ -54,11 +54,12 @@ def swap_parts(characters: Sequence[SurfaceMesh], rng: np.random.Generator) -> S
         )
     raised = _placed(parts["head"], 1.0, body.neck - head.neck)
     lengthened = _placed(parts["legs"], body.hips / legs.hips, 0.0)
-    joined = _joined([parts["body"], raised, lengthened])
-    return _standing(posed(_standing(joined), rng))
+    together = joined([parts["body"], raised, lengthened])
+    return standing(posed(standing(together), rng))
 
 
-def _standing(surface: SurfaceMesh) -> SurfaceMesh:
+def standing(surface: SurfaceMesh) -> SurfaceMesh:
+    """A surface brought to 2 m, feet on z = 0, middle of its box on the z axis, reaching no farther than 1.5 m to a side."""
     triangles = stand(surface.triangles.astype(np.float64), reach=np.array((REACH, REACH)))
     return replace(surface, triangles=triangles.astype(np.float32))
 
@@ -157,7 +158,7 @@ def _above(corners: np.ndarray, ids: np.ndarray, height: float, sign: float) -> 
     return np.concatenate(kept), np.concatenate(kept_ids)
 
 
-def _joined(parts: Sequence[SurfaceMesh]) -> SurfaceMesh:
+def joined(parts: Sequence[SurfaceMesh]) -> SurfaceMesh:
     """Several surfaces as one."""
     starts = np.cumsum([0, *(len(part.materials) for part in parts)])
     return SurfaceMesh(

@@ -82,6 +82,13 @@ Swaps = Annotated[
         help="Capture so many characters with each mesh's body and other given meshes' heads and legs: NAME+s1, ...",
     ),
 ]
+Dressed = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        help="Capture so many variants of each mesh that wear hats, hair, plates, packs and skirts of any shape: NAME+w1, ...",
+    ),
+]
 Drawn = Annotated[
     int,
     typer.Option(
@@ -90,7 +97,9 @@ Drawn = Annotated[
         " it: NAME+d1, ...",
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="The same seed gives the same variants, swaps and drawings.")]
+Seed = Annotated[
+    int, typer.Option(min=0, help="The same seed gives the same variants, swaps, clothes and drawings.")
+]
 
 
 def command(
@@ -107,6 +116,7 @@ def command(
     depth: Depth = False,
     variants: Variants = 0,
     swaps: Swaps = 0,
+    dressed: Dressed = 0,
     drawn: Drawn = 0,
     seed: Seed = 0,
     renderer: Renderer = "builtin",
@@ -119,9 +129,8 @@ def command(
 ) -> None:
     """Turn meshes into a data set: pictures from all around, source views, cameras, surface.
 
-    Every character is brought to 2 m height with its feet on the floor; its name is its file's stem, and one
-    that is in the data set already is refused. Exit status 1 if a mesh could not be captured; the others are. The
-    same command goes on with a capture that was interrupted.
+    Every character is brought to 2 m height with its feet on the floor; its name is its file's stem, and one that is in the data
+    set already is refused. Exit status 1 if a mesh could not be captured; others are. The same command goes on when interrupted.
     """
     from charnerf.capture.character import CaptureOptions
     from charnerf.capture.dataset import capture_dataset
@@ -130,7 +139,7 @@ def command(
     began = time.perf_counter()
     check_json(json_file)
     eye = _renderer(renderer, engine=engine, samples=samples, pose=pose, objects=tuple(objects or ()))
-    copies = {"variants": variants, "swaps": swaps, "drawn": drawn, "seed": seed}
+    copies = {"variants": variants, "swaps": swaps, "dressed": dressed, "drawn": drawn, "seed": seed}
     done = capture_dataset(
         meshes,
         output,

@@ -58,6 +58,19 @@ def make_colors(rng: Rng) -> list[Color]:
     ]
 
 
+def make_piece(rng: Rng, colors: list[Color], centre: ArrayLike, half: ArrayLike) -> SurfaceMesh:
+    """One solid of any kind, nearly upright.
+
+    Args:
+        rng: What is drawn from.
+        colors: From `make_colors`.
+        centre: World frame, (3,), m.
+        half: Half of its sizes, (3,), m.
+    """
+    solid = _upright(rng, colors, centre, half)
+    return surface_of(solid, solid.vertices)
+
+
 def surface_of(solid: Solid, vertices: Array) -> SurfaceMesh:
     """The surface of a solid whose vertices stand at given places (n, 3)."""
     count = len(solid.faces)
