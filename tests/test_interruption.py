@@ -1,4 +1,4 @@
-"""SIGTERM and SIGINT: the first asks, the second ends at once."""
+"""SIGTERM, SIGINT and SIGHUP: the first asks, the second ends at once."""
 
 import os
 import signal
@@ -19,7 +19,9 @@ def ask(number: int) -> None:
     time.sleep(0.01)  # handlers run between two instructions
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGHUP, 129)]
+)
 def test_a_signal_stops_what_runs_and_handlers_are_put_back(number, status):
     before = signal.getsignal(number)
     with pytest.raises(Stopped) as stop, listening():
@@ -38,6 +40,33 @@ def test_held_signals_are_answered_when_the_block_ends():
             done.append("inner")
         done.append("never")
     assert done == [signal.SIGTERM, "inner"]
+
+
+def test_a_closed_terminal_lets_what_is_at_hand_become_whole(tmp_path):
+    """What is printed meanwhile would be an error; the shell's own signal comes on top of the system's."""
+    pty = pytest.importorskip("pty")
+    code = """
+        import os, signal, sys, time
+        from charnerf.interruption import Stopped, held, listening, requested
+        print("ready", flush=True)
+        try:
+            with listening(), held():
+                while requested() is None:
+                    time.sleep(0.01)
+                os.kill(os.getpid(), signal.SIGHUP)
+                time.sleep(0.05)
+                print("a line", flush=True)
+                open(sys.argv[1], "w").write("whole")
+        except Stopped as stop:
+            sys.exit(stop.status)
+        """
+    process, terminal = pty.fork()
+    if process == 0:
+        os.execv(sys.executable, [sys.executable, "-c", textwrap.dedent(code), str(tmp_path / "file")])
+    assert os.read(terminal, 5) == b"ready"
+    os.close(terminal)
+    _, status = os.waitpid(process, 0)
+    assert os.waitstatus_to_exitcode(status) == 129 and (tmp_path / "file").read_text() == "whole"
 
 
 def test_an_error_of_the_block_comes_first():

@@ -1,23 +1,25 @@
-"""SIGTERM and SIGINT: the first asks a process to end, a second one ends it at once.
+"""SIGTERM, SIGINT and SIGHUP: the first asks a process to end, a second one ends it at once.
 
-A door listens (`listening`); then a signal raises `Stopped`, which cleans up as an error does and ends in exit status 143
-or 130. Work that has to come to a point of its own first holds signals back (`held`).
+A door listens (`listening`); then a signal raises `Stopped`, which cleans up as an error does and ends in exit status 143,
+130 or 129. Work that has to come to a point of its own first holds signals back (`held`).
 """
 
 import logging
 import os
 import signal
+import stat
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from types import FrameType
 from typing import NoReturn
 
-SIGNALS = (signal.SIGTERM, signal.SIGINT)
+_NAMES = ("SIGTERM", "SIGINT", "SIGHUP")  # Windows has no terminals that hang up
+SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 _PATIENCE = 60.0  # seconds for a last checkpoint
 _NOTE = b"\nstopping as soon as what is at hand is whole; a second signal ends at once.\n"
@@ -159,12 +161,25 @@ def end_with_parent() -> None:
 def _on_signal(number: int, _: FrameType | None) -> None:
     if not is_listening():  # forked meanwhile
         os._exit(128 + number)
+    has_hung_up = signal.Signals(number).name == "SIGHUP"
     if _interruption.received is not None:
-        if _interruption.in_worker:
+        if _interruption.in_worker or has_hung_up:  # a closed terminal's system and shell both send one
             return
         os._exit(128 + number)
     _interruption.received = number
+    if has_hung_up:
+        _leave_terminal()
     if not _interruption.in_worker:
         os.write(2, _NOTE)
     if not _interruption.holds:
         raise Stopped(number)
+
+
+def _leave_terminal() -> None:
+    """Write to nowhere what would go to a terminal that is gone: every line would be an error, in the midst of a checkpoint."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number in (0, 1, 2):
+        with suppress(OSError):  # closed
+            if stat.S_ISCHR(os.fstat(number).st_mode):
+                os.dup2(nowhere, number)
+    os.close(nowhere)

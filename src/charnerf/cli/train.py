@@ -44,7 +44,8 @@ def main(arguments: Sequence[str], *, conf: Path | None = None) -> int:
         conf: Folder of the config files; the package's own if None.
 
     Returns:
-        Exit status: 0 done, 1 failed, 2 wrong call; 130 and 143 stopped by SIGINT (Ctrl-C) and SIGTERM, with a checkpoint.
+        Exit status: 0 done, 1 failed, 2 wrong call; 130, 143 and 129 stopped by SIGINT (Ctrl-C), SIGTERM and
+        SIGHUP, with a checkpoint.
         HYDRA_FULL_ERROR=1 shows tracebacks.
     """
     limit_spinning()
