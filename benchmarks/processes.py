@@ -15,7 +15,7 @@ from typing import Any
 
 from benchmarks.threads import SMALL, TRAIN
 
-STEPS, MARKS, ROUNDS = 100, 10, 1
+STEPS, MARKS, ROUNDS = 40, 8, 2
 TWICE = (
     "scale.batch_characters=2",
     "scale.phase_rays=[1024,2048]",

@@ -12,7 +12,7 @@ import pytest
 import torch
 from PIL import Image
 
-from charnerf.cli import run
+from charnerf.cli import check, run
 from charnerf.data import json_values
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import read_dataset
@@ -295,3 +295,5 @@ def test_training_and_commands_take_them(
         )
         == 2
     )
+    views, camera = check._character(None, foreign("nerfstudio"), None)
+    assert views.images.shape[:2] == (1, 3) and camera.width == check.CHECKED_SIZE

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from charnerf.cli.dataset import GivenDataset
 from charnerf.cli.messages import say
 from charnerf.cli.model import load_model
 from charnerf.cli.options import Device, SomeDataset, SplitName, Trusted, Weights
@@ -40,7 +41,8 @@ def command(
     check_json(json_file)
     check_folder(output)
     model = load_model(weights, device=device, trust=trust)
-    result = run(model, data=data, split=split, quick=quick, output=output, say=say)
+    root = None if data is None else GivenDataset(data, None).opened()
+    result = run(model, data=root, split=split, quick=quick, output=output, say=say)
     show(summary(result), json_file)
     files = () if quick else (output,)
     close(Summary(made="error against run time", files=files, began=began, facts=result), json_file)

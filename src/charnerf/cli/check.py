@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from charnerf.cli.dataset import GivenDataset
 from charnerf.cli.model import load_model, pick_device
 from charnerf.cli.options import Device, SomeCharacter, SomeDataset, Trusted
 from charnerf.cli.summary import JsonFile, Summary, check_json, close, show
@@ -83,10 +84,11 @@ def _character(model: "Model", data: Path | None, name: str | None) -> tuple["So
         from charnerf.data.characters import load_character
         from charnerf.data.layout import read_dataset
 
-        names = [one for split in read_dataset(data).splits.values() for one in split]
+        root = GivenDataset(data, None).opened()
+        names = [one for split in read_dataset(root).splits.values() for one in split]
         if not names:
             raise DataError(f"{data}: found no characters, expected at least one.")
-        character = load_character(data, name or names[0])
+        character = load_character(root, name or names[0])
         return character.sources, _small(character.cameras[0])
     from charnerf.capture.character import CaptureOptions, capture_character
     from charnerf.capture.lights import Unlit

@@ -46,7 +46,7 @@ SomeDataset = Annotated[
         metavar="DATASET",
         exists=True,
         file_okay=False,
-        help="Data set of the characters; embedded ones if left out.",
+        help="Data set of the characters, ours or a foreign one; embedded ones if left out.",
     ),
 ]
 SplitName = Annotated[
