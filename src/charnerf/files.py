@@ -13,6 +13,7 @@ from typing import BinaryIO
 from charnerf.errors import DataError
 from charnerf.interruption import held
 
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # the opening of a pipe waits for nobody
 MOST_TEXT = 64 * 2**20  # bytes of a file that is read whole, such as JSON
 
 
@@ -24,13 +25,19 @@ def open_regular(path: Path) -> BinaryIO:
         OSError: If it can not be opened.
     """
     try:
-        mode = path.stat().st_mode
+        handle = os.open(path, os.O_RDONLY | _AT_ONCE)
     except ValueError as error:  # NUL, or half of a character
         raise DataError(f"{str(path)!r}: can not be a file's name ({error}).") from error
+    except OSError as error:
+        if error.errno == errno.ENXIO:
+            raise DataError(f"{path}: found a socket or device, expected a file.") from error
+        raise
+    mode = os.fstat(handle).st_mode  # of what is open: the name may mean something else by now
     if not stat.S_ISREG(mode):
+        os.close(handle)
         what = "a folder" if stat.S_ISDIR(mode) else "a pipe, socket or device"
         raise DataError(f"{path}: found {what}, expected a file.")
-    return path.open("rb")
+    return os.fdopen(handle, "rb")
 
 
 def read_bytes(path: Path, *, most: int) -> bytes:

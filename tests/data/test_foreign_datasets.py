@@ -204,7 +204,7 @@ READERS = {
     "x.png": (load_drawing, lambda path: read_rgba(path, (32, 32))),
     "x.json": (read_json, read_metrics),
     "x.csv": (read_curve, read_views),
-    "x.safetensors": (charnerf.load,),
+    "x.safetensors": (charnerf.load, charnerf.load_baked),
     "x.ckpt": (charnerf.load,),
     "x.glb": (load_scene,),
     "x.obj": (load_scene, load_surface_mesh),
@@ -225,6 +225,24 @@ def test_what_is_no_file_is_refused_at_once(name: str, kind: str, tmp_path: Path
     for reader in READERS[name]:
         with pytest.raises(DataError):
             reader(path)
+
+
+def test_a_file_that_becomes_a_pipe_once_it_was_looked_at_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stranger may swap the two between a look and the opening; who opens a pipe waits for its writer."""
+    path, pipe = tmp_path / "x.json", tmp_path / "pipe"
+    path.write_text("{}")
+    os.mkfifo(pipe)
+    plain = os.open
+
+    def swapped(name: object, *more: int) -> int:
+        os.replace(pipe, path)
+        return plain(name, *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(os, "open", swapped)
+    with pytest.raises(DataError, match="found a pipe"):
+        read_json(path)
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg", "eps"])

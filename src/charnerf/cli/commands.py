@@ -38,8 +38,9 @@ from charnerf.process import limit_spinning
 
 FAILED, WRONG_CALL = 1, 2
 DEBUG_NOTE = (
-    "Exit status: 0 done, 1 failed, 2 wrong call. 130 stopped by Ctrl-C (SIGINT), 143 by SIGTERM, 129 by SIGHUP."
-    " --debug shows the traceback of an error, --quiet leaves out all but warnings and errors; both also after the command."
+    "Exit status: 0 done, 1 failed, 2 wrong call. 130 stopped by Ctrl-C (SIGINT), 143 by SIGTERM, 129 by SIGHUP, as its"
+    " terminal closed. --debug shows the traceback of an error, --quiet leaves out all but warnings and errors; both also after"
+    " the command."
 )
 
 

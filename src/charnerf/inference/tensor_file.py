@@ -6,6 +6,7 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from charnerf.errors import DataError
+from charnerf.files import open_regular
 
 
 def read_tensors(
@@ -23,6 +24,7 @@ def read_tensors(
         DataError: If it can not be read, or is of another format.
     """
     try:
+        open_regular(file).close()
         with safe_open(str(file), framework="pt") as opened:
             metadata: dict[str, str] = opened.metadata() or {}
             tensors = {name: opened.get_tensor(name) for name in opened.keys()}
