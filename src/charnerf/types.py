@@ -53,7 +53,11 @@ class TensorRecord(MovableRecord):
 
     def rows(self, index: Tensor) -> Self:
         """Rows of the first axis by their numbers (N,), none of them negative: a third of the time of indexing."""
-        return self._map(lambda value: value.index_select(0, index))
+        return self._map(
+            lambda value: (
+                value.rows(index) if isinstance(value, TensorRecord) else value.index_select(0, index)
+            )
+        )
 
     @classmethod
     def joined(cls, records: Sequence[Self]) -> Self:

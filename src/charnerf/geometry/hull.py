@@ -73,7 +73,7 @@ def hull_contains(hull: Hull, points: Tensor) -> Tensor:
     inside = ((scaled >= 0) & (scaled < cells)).all(-1)
     index = scaled.clamp(0, cells - 1).long()
     flat = (index[..., 0] * cells + index[..., 1]) * cells + index[..., 2]
-    return inside & hull.occupancy.reshape(-1)[flat]
+    return inside & hull.occupancy.reshape(-1).index_select(0, flat.reshape(-1)).view(flat.shape)
 
 
 def occupied_edges(

@@ -91,7 +91,7 @@ def occupied_at(occupancy: Tensor, hull: Hull, rays: RayBundle, t_vals: Tensor) 
         index = (slope[:, axis, None] * t_vals).add_(start[:, axis, None]).clamp_(0, cells - 1).int()
         flat = index if flat is None else flat.mul_(cells).add_(index)
     assert flat is not None
-    return occupancy.reshape(-1)[flat]
+    return occupancy.reshape(-1).index_select(0, flat.view(-1)).view(flat.shape)
 
 
 def segment_bins(occupied: Tensor, lengths: Tensor, spacing: float, max_bins: int) -> tuple[Tensor, Tensor]:

@@ -55,7 +55,7 @@ class CulledRenderer(AbstractRenderer):
                 _, passed = self.quadrature.weights(so_far, samples.s_vals, samples.s_edges)
                 counted &= (passed > UNSEEN)[:, None]
             packed = counted.reshape(-1).nonzero()[:, 0]
-            answer = in_chunks(field, points[packed], dirs[packed], chunk)
+            answer = in_chunks(field, points.index_select(0, packed), dirs.index_select(0, packed), chunk)
             rgb = rgb.index_copy(0, packed, answer.rgb.to(rgb.dtype))
             densities = densities.index_copy(0, packed, answer.densities.to(densities.dtype))
             evaluated += len(packed)

@@ -52,28 +52,29 @@ class Samples:
         Returns:
             Numbers of the samples, (r, K); -1 where not wanted.
         """
-        row, column = wanted.nonzero().unbind(-1)
-        ray = rows[row]
-        directions = self.rays.directions[ray]
-        points = torch.addcmul(self.rays.origins[ray], directions, t_vals[row, column, None])
+        places = wanted.reshape(-1).nonzero()[:, 0]
+        rays = self.rays.rows(rows.index_select(0, places // wanted.shape[1]))
+        along = t_vals.reshape(-1).index_select(0, places)
+        points = torch.addcmul(rays.origins, rays.directions, along[:, None])
         start, count, densities = len(self), len(points), []
         held = self.scene.bounds.may_hold(points)
         inside, empty = held.nonzero()[:, 0], (~held).nonzero()[:, 0]
         for first in range(0, len(inside), self.size):
             some = inside[first : first + self.size]
-            answer = self.scene.field.densities(points[some], directions[some])
+            answer = self.scene.field.densities(
+                points.index_select(0, some), rays.directions.index_select(0, some)
+            )
             self._answers.append((start + first, answer))
             densities.append(answer.densities)
         densities.append(self._densities.new_zeros(len(empty)))
         self._densities = torch.cat((self._densities[:-1], *densities, self._densities[-1:]))
         self._rgb = torch.cat((self._rgb[:-1], self._rgb.new_full((count + 1, 3), GREY)))
         self._colored = torch.cat((self._colored[:-1], self._colored.new_zeros(count + 1)))
-        numbers = torch.full_like(wanted, -1, dtype=torch.long)
-        order = torch.cat(
-            (inside, empty)
-        )  # no answer holds the colours of the latter: a weight of zero asks for none
-        numbers[row[order], column[order]] = torch.arange(start, start + count, device=numbers.device)
-        return numbers
+        numbers = places.new_full((wanted.numel(),), -1)
+        # no answer holds the colours of what is empty: a weight of zero asks for none
+        order = places.index_select(0, torch.cat((inside, empty)))
+        numbers[order] = torch.arange(start, start + count, device=numbers.device)
+        return numbers.view(wanted.shape)
 
     def densities(self, numbers: Tensor) -> Tensor:
         """Densities of samples by number, zero for none."""
@@ -89,7 +90,7 @@ class Samples:
                 torch.searchsorted(starts, missing, right=True) - 1, minlength=len(starts)
             ).tolist()
             groups = zip(self._answers, missing.split(counts), strict=True)
-            parts = [answer.state[group - start] for (start, answer), group in groups if len(group)]
+            parts = [answer.state.rows(group - start) for (start, answer), group in groups if len(group)]
             self._rgb[missing] = self._evaluate(type(parts[0]).joined(parts), len(missing))
             self._colored[missing] = True
             self.num_colors += len(missing)
