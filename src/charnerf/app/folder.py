@@ -15,7 +15,9 @@ PREFIX = "charnerf-app-"
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
     """A folder that only this user can read; it goes when the block ends."""
-    for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/lock"):
+    for old in (
+        Path(tempfile.gettempdir()).glob(f"{PREFIX}*/lock") if os.name == "posix" else ()
+    ):  # else no locks
         if old.stat().st_uid == os.getuid() and not is_locked(old):
             shutil.rmtree(old.parent, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as folder:

@@ -65,25 +65,25 @@ class Field:
 
 
 COLORS = {
-    "drawings": "from the drawings (texture)",
-    "field": "by the field (texture)",
-    "vertex": "by the field, at vertices",
+    "drawings": "from the drawings",
+    "field": "by the field",
+    "vertex": "at vertices",
 }
 FIELDS = (
     Field("resolution", "Resolution", "Points of the grid along the height: more show finer parts and take longer.", "number",
           DEFAULT.mesh.resolution, "Mesh", 32, 256),
     Field("faces", "Faces", "Triangles of the mesh.", "number", LIGHT.faces, "Mesh", 100, 60_000),
     Field("levels", "Levels of detail", "Faces of further, lighter meshes, such as 2000, 500.", "text", "", "Mesh"),
-    Field("texture", "Colours", "What the mesh is painted with.", "choice", DEFAULT.mesh.texture, "Mesh",
+    Field("texture", "Colours", "What paints it: a texture, or colours at vertices.", "choice", DEFAULT.mesh.texture, "Mesh",
           choices=tuple((name, COLORS[name]) for name in get_args(Texture))),
     Field("texture_size", "Texture size", "Texels a side.", "number", DEFAULT.mesh.texture_size, "Mesh", 128, 4096),
     Field("smooth", "Smoothing", "Rounds; 10 evens a frayed surface out.", "number", DEFAULT.mesh.smooth, "Mesh", 0, 100),
     Field("symmetric", "Symmetric", "Averages left and right, for characters that are alike on both sides.", "switch",
           DEFAULT.symmetric, "Mesh"),
     Field("refine", "Refine", "Seconds in which the model is adapted to these drawings first; kept only where it helps.", "number",
-          0, "Character", 0, 600),
-    Field("frames", "Turntable frames", "Pictures around the character.", "number", DEFAULT.frames, "Character", 1, 120),
-    Field("size", "Picture size", "Pixels a side of turntable and views.", "number", DEFAULT.size, "Character", 64, 512),
+          0, "Field and pictures", 0, 600),
+    Field("frames", "Turntable frames", "Pictures around the character.", "number", DEFAULT.frames, "Field and pictures", 1, 120),
+    Field("size", "Picture size", "Pixels a side of turntable and views.", "number", DEFAULT.size, "Field and pictures", 64, 512),
     Field("as_drawn", "As drawn", "Takes views as they are, also where they disagree.", "switch",
           not ReadingOptions.reconciled, "Drawings"),
     Field("keep_ink", "Keep ink", "Takes lines along outlines for paint.", "switch", ReadingOptions.keep_ink, "Drawings"),

@@ -96,6 +96,7 @@ async function add(files) {
     }
     if (failed.length) throw new Error(failed.join(" "));
   });
+  $("reading").hidden = !state?.busy;
   $("files").value = "";
 }
 
@@ -382,8 +383,8 @@ function leftText(seconds) {
 
 const megabytes = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
 
-function build(more = {}) {
-  return attempt(() => ask("POST", at("build"), JSON.stringify({ ...settings(), ...more })), "job-problem");
+function build() {
+  return attempt(() => ask("POST", at("build"), JSON.stringify(settings())), "build-problem");
 }
 
 // ---- what was made
@@ -527,7 +528,7 @@ $("anew").onclick = () => attempt(async () => {
   for (const { number } of state.pictures) await ask("DELETE", at(`pictures/${number}`));
   $("choose").querySelector("input").focus();
 });
-$("cancel").onclick = () => attempt(() => ask("POST", at("cancel")), "job-problem");
+$("cancel").onclick = () => attempt(() => ask("POST", at("cancel")), "build-problem");
 $("turn").onclick = () => turn(!turning);
 for (const name of ["azimuth", "elevation"]) $(name).addEventListener("input", () => {
   turn(false);
