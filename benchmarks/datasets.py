@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import os
 import statistics
 import sys
 import tempfile
@@ -20,6 +21,7 @@ import torch
 
 from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.generated import character_seed, generate_dataset
+from charnerf.capture.renderers.blender import Blender
 from charnerf.config.composition import compose_config
 from charnerf.data.layout import read_dataset
 from charnerf.data.mixed import MixedDataset
@@ -28,7 +30,9 @@ from charnerf.data.sampler import BatchRequest, Share
 from charnerf.data.shards_data import ShardsData
 from charnerf.data.store import CharacterStore
 from charnerf.data.window import Window, groups_of
+from charnerf.errors import DependencyError
 from charnerf.files import write_text
+from charnerf.geometry.framing import SOURCE_ORDER
 from charnerf.inference.build import build_model
 from charnerf.losses.base import Needs
 from charnerf.procedural import make_character
@@ -59,7 +63,7 @@ def main(arguments: Sequence[str]) -> None:
     output = parser.parse_args(arguments).output
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
-        rows = [*capture_rows(), *dataset_rows(Path(folder))]
+        rows = [*capture_rows(), *blender_rows(), *dataset_rows(Path(folder))]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("measure", "value", "unit"))
@@ -84,6 +88,29 @@ def capture_rows() -> list[Row]:
             seconds.append(time.process_time() - begun)
         rows.append(Row(f"capture, {views} views of {SIZE} px", statistics.median(seconds), "s a character"))
         rows.append(Row(f"capture, {views} views of {SIZE} px", counted.rays / sum(seconds), "rays a second"))
+    return rows
+
+
+def blender_rows() -> list[Row]:
+    """The same of Blender, by Cycles and with its start, of one character; none where there is no Blender."""
+    renderer = Blender()
+    try:
+        renderer.check()
+    except DependencyError as err:
+        sys.stderr.write(f"{err}\n")
+        return []
+    rows, scene = [], make_character(character_seed(0, "test", 0))
+    for views in (48, 300):
+        begun = os.times()
+        capture_character(scene, CaptureOptions(views=views, size=SIZE, renderer=renderer))
+        ended = os.times()
+        seconds = sum(
+            getattr(ended, name) - getattr(begun, name)
+            for name in ("user", "system", "children_user", "children_system")
+        )
+        rays = (views + len(SOURCE_ORDER)) * SIZE**2 * renderer.samples
+        rows.append(Row(f"capture by Blender, {views} views of {SIZE} px", seconds, "s a character"))
+        rows.append(Row(f"capture by Blender, {views} views of {SIZE} px", rays / seconds, "rays a second"))
     return rows
 
 

@@ -166,9 +166,10 @@ def test_a_broken_file_is_told(tmp_path, files):
 def test_materials_that_no_picture_says_are_baked_and_named(files):
     """Mixes of colours and shaders are baked; colour times corner colour, and moved pictures on a second UV map, are exact."""
     found = read(files / "materials.blend")
-    assert sorted(note.split("'")[1] for note in found.notes) == ["mixed", "shaders"]
+    assert sorted(note.split("'")[1] for note in found.notes) == ["mixed", "shaders", "veil"]
     surface = found.surface
     x = surface.triangles.mean(axis=1)[:, 0]
+    boxes = np.floor((x - surface.triangles[..., 0].min()) / 0.3 + 0.01)
     third = np.full(len(x), 1.0 / 3.0)
     rgba = shade(surface, np.arange(len(x)), third, third)
     wanted = (
@@ -176,8 +177,11 @@ def test_materials_that_no_picture_says_are_baked_and_named(files):
         0.5 * np.array((0.5, 0.4, 0.1)) + 0.5 * np.array((0.1, 0.4, 0.9)),
         (0.4, 0.3, 0.2),
         linear_from_srgb(np.array((0.2 + 0.6 * 0.35, 0.3 + 0.4 * 0.5, 0.6 - 0.3 * 0.35))),
+        (0.2, 0.2, 0.2),
+        (0.2, 0.2, 0.2),
     )
     for index, color in enumerate(wanted):
-        box = np.abs(x - x.min() - (x.max() - x.min()) * index / 3.0) < 0.12
-        np.testing.assert_allclose(rgba[box, :3], np.tile(color, (box.sum(), 1)), atol=0.02)
-    assert surface.materials[-1].cutoff == 0.5
+        found = rgba[boxes == index]
+        np.testing.assert_allclose(found[:, :3], np.tile(color, (12, 1)), atol=0.02)
+        assert (found[:, 3] == (index < 4)).all()  # an alpha of 0.3 is a hole
+    assert surface.materials[3].cutoff == 0.5

@@ -167,7 +167,7 @@ def make_evil(folder: Path) -> None:
 
 
 def make_materials(folder: Path) -> None:
-    """Boxes side by side, 0.3 m apart, each with a material that a picture alone does not say."""
+    """Boxes side by side, 0.3 m apart, each with a material that a picture alone does not say; two share the last."""
     mixed, shader = new_material("mixed")
     mix = mixed.node_tree.nodes.new("ShaderNodeMix")
     mix.data_type = "RGBA"
@@ -209,7 +209,13 @@ def make_materials(folder: Path) -> None:
     tree.links.new(image.outputs["Color"], shader.inputs["Base Color"])
     tree.links.new(image.outputs["Alpha"], shader.inputs["Alpha"])
 
-    for index, material in enumerate((mixed, shaders, painted, moved)):
+    veil, shader = new_material("veil")
+    add = veil.node_tree.nodes.new("ShaderNodeMath")
+    add.inputs[0].default_value, add.inputs[1].default_value = 0.1, 0.2
+    shader.inputs["Base Color"].default_value = (0.2, 0.2, 0.2, 1.0)
+    veil.node_tree.links.new(add.outputs[0], shader.inputs["Alpha"])
+
+    for index, material in enumerate((mixed, shaders, painted, moved, veil, veil)):
         box = add_box(material.name, (0.3 * index, 0.0, 1.0), (0.2, 0.2, 2.0), material)
         box.data.color_attributes.new("paint", "FLOAT_COLOR", "CORNER").data.foreach_set(
             "color", np.tile(np.array((0.8, 0.3, 0.2, 1.0), np.float32), 24)

@@ -56,7 +56,10 @@ def run_job(folder: Path, job: Mapping[str, Any], *, where: str, limit_s: float)
     file.write_text(json.dumps({**job, "parent": os.getpid()}), encoding="utf-8")
     answer.unlink(missing_ok=True)
     log = folder / "blender.log"
-    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user")}  # nobody's add-ons
+    own = {
+        "BLENDER_USER_RESOURCES": str(folder / "user"),
+        "TMPDIR": str(folder),
+    }  # nobody's add-ons, no leftovers
     try:
         with log.open("wb") as output:
             status = subprocess.run(
@@ -64,7 +67,7 @@ def run_job(folder: Path, job: Mapping[str, Any], *, where: str, limit_s: float)
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                env=environment,
+                env={**os.environ, **own},
                 timeout=limit_s,
                 check=False,
             ).returncode

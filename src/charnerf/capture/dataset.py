@@ -315,7 +315,8 @@ def _capture_item(
             draw=partial(draw, rng=rng) if draw and item.kind == "d" else None,
         )
     except CharNeRFError as err:
-        return _Outcome(failure=str(err))
+        said = str(err)
+        return _Outcome(failure=said if said.startswith(f"{item.file}:") else f"{item.file}: {said}")
     except OSError:  # of the data set's own disk, which all share: readers make DataErrors of theirs
         raise
     except Exception as err:  # whatever one mesh makes fail stops no other

@@ -70,7 +70,7 @@ def _bake(
     flat: bpy.types.Object, materials: Mapping[int, bpy.types.Material], wanted: Mapping[int, Source]
 ) -> dict[int, bpy.types.Image]:
     """Pictures of sources of materials, by their slots."""
-    images = {}
+    images, shown = {}, []
     for slot, holder in enumerate(flat.material_slots):
         is_wanted = slot in wanted
         tree = (materials[slot] if is_wanted else _fresh(holder)).node_tree
@@ -86,10 +86,13 @@ def _bake(
             output = next(
                 each for each in tree.nodes if each.type == "OUTPUT_MATERIAL" and each.is_active_output
             )
+            shown.append((tree, output.inputs["Surface"].links[0].from_socket, output.inputs["Surface"]))
             tree.links.new(emission.outputs[0], output.inputs["Surface"])
             images[slot] = image
     _select(flat)
     bpy.ops.object.bake(type="EMIT", margin=_MARGIN, use_clear=True, uv_layer=_UV_MAP)
+    for tree, *link in shown:  # other objects may have the material too
+        tree.links.new(*link)
     return images
 
 

@@ -11,6 +11,12 @@ _NO_COLLADA = (
     "Blender {version} reads no Collada (it was taken out of 5.0): put an older `blender` on PATH, "
     "or save the character as FBX or GLB"
 )
+_NO_IMPORTER = "Blender {version} has no importer for {suffix}; use the wheel, bpy 5.0 or later"
+_OPERATORS = {  # of bpy.ops, the first that this Blender has
+    ".fbx": (("wm", "fbx_import"), ("import_scene", "fbx")),
+    ".obj": (("wm", "obj_import"), ("import_scene", "obj")),
+    ".dae": (("wm", "collada_import"),),
+}
 
 
 def open_file(file: Path) -> list[str]:
@@ -43,21 +49,11 @@ def _importer(suffix: str) -> Callable[[str], object]:
         return lambda path: bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
     if suffix in (".glb", ".gltf", ".vrm"):
         return lambda path: bpy.ops.import_scene.gltf(filepath=path, guess_original_bind_pose=False)
-    if suffix == ".fbx":
-        operator = _operator("wm", "fbx_import") or _operator("import_scene", "fbx")
-    elif suffix == ".obj":
-        operator = _operator("wm", "obj_import") or _operator("import_scene", "obj")
-    elif suffix == ".dae":
-        operator = _operator("wm", "collada_import")
-        if operator is None:
-            raise Refused(_NO_COLLADA.format(version=bpy.app.version_string))
-    else:
-        raise Refused(f"found the suffix {suffix!r}, which Blender is not asked to read")
-    if operator is None:
-        raise Refused(
-            f"Blender {bpy.app.version_string} has no importer for {suffix}; use the wheel, bpy 5.0 or later"
-        )
-    return lambda path: operator(filepath=path)
+    found = [each for group, name in _OPERATORS[suffix] if (each := _operator(group, name)) is not None]
+    if not found:
+        advice = _NO_COLLADA if suffix == ".dae" else _NO_IMPORTER
+        raise Refused(advice.format(version=bpy.app.version_string, suffix=suffix))
+    return lambda path: found[0](filepath=path)
 
 
 def _operator(group: str, name: str) -> Callable[..., object] | None:

@@ -70,6 +70,11 @@ class Blender(AbstractRenderer):
 
     def read(self, file: Path, up: str | None, facing: str | None) -> ReadCharacter:
         """Import a file, set its pose and bake what no picture says."""
+        if file.suffix.lower() not in self.suffixes:
+            raise DataError(
+                f"{file}: found the suffix {file.suffix!r}, expected one of {', '.join(self.suffixes)}; "
+                "capture it without Blender, or convert it."
+            )
         rotation = turn_of(file, up, facing)
         check_files(file)
         action, frame = self._action()
@@ -160,6 +165,8 @@ def _view(camera: Cameras) -> dict[str, Any]:
 
 
 def _shot(folder: Path, index: int, *, depth: bool) -> Shot:
+    if not (folder / f"{index:03d}.png").is_file():
+        raise DataError(f"Blender wrote no picture {index}; see that its temporary folder has room.")
     with Image.open(folder / f"{index:03d}.png") as picture:
         rgba = np.array(picture.convert("RGBA"))
     if not depth:
