@@ -145,6 +145,12 @@ def test_one_of_several_figures_is_chosen_by_name(files):
     assert Blender(objects=("anna_Hero",)).name_of(files / "two.blend") == "two-anna_Hero"
 
 
+def test_instances_and_curves_are_taken_once(files):
+    triangles = read(files / "kinds.blend").surface.triangles
+    assert len(triangles) > 500 and len(np.unique(triangles.reshape(-1, 9), axis=0)) == len(triangles)
+    assert len(read(files / "kinds.blend", objects=("placed",)).surface.triangles) == 12
+
+
 def test_no_script_of_a_file_runs(files):
     """Nor the Python of its drivers; that they were not run is told."""
     assert read(files / "evil.blend").notes == ("its scripts and scripted drivers were not run",)

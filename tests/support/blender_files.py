@@ -225,8 +225,22 @@ def make_materials(folder: Path) -> None:
     save(folder / "materials.blend")
 
 
+def make_kinds(folder: Path) -> None:
+    """A box that is only there as a collection's instance, and a hoop that is a curve."""
+    box = add_box("box", (0.0, 0.0, 1.0), (0.2, 0.2, 2.0), None)
+    group = bpy.data.collections.new("group")
+    group.objects.link(box)
+    bpy.context.scene.collection.objects.unlink(box)
+    placed = bpy.data.objects.new("placed", None)
+    placed.instance_type, placed.instance_collection, placed.location = "COLLECTION", group, (0.5, 0.0, 0.0)
+    bpy.context.scene.collection.objects.link(placed)
+    bpy.ops.curve.primitive_bezier_circle_add(radius=0.2, location=(0.0, 0.0, 1.0))
+    bpy.context.object.name, bpy.context.object.data.bevel_depth = "hoop", 0.05
+    save(folder / "kinds.blend")
+
+
 def main(folder: Path) -> None:
-    for make in (make_formats, make_two, make_evil, make_materials):
+    for make in (make_formats, make_two, make_evil, make_materials, make_kinds):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         make(folder)
 

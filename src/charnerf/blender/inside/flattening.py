@@ -2,8 +2,6 @@
 
 import bpy
 
-from charnerf.blender.inside.characters import SHAPES
-
 
 def flatten(chosen: set[bpy.types.Object]) -> list[bpy.types.Object]:
     """Replace everything in the scene by plain meshes of what is chosen.
@@ -22,7 +20,8 @@ def flatten(chosen: set[bpy.types.Object]) -> list[bpy.types.Object]:
     for instance in depsgraph.object_instances:
         shape, holder = instance.object, instance.parent if instance.is_instance else instance.object
         is_shown = instance.show_self and not shape.original.hide_render
-        if not is_shown or shape.type not in SHAPES or holder.original not in chosen:
+        # curves, texts and metaballs come a second time, as meshes that are their own instances
+        if not is_shown or shape.type != "MESH" or holder.original not in chosen:
             continue
         mesh = bpy.data.meshes.new_from_object(shape, preserve_all_data_layers=True, depsgraph=depsgraph)
         if mesh is not None and len(mesh.polygons):
