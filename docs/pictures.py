@@ -97,10 +97,8 @@ def sheet(model: Model, rows: list[Drawings]) -> Image.Image:
         font,
     )
     for place, row in enumerate(rows):
-        hero, top = (
-            model.encode(views={view: drawing for view, drawing in row.items()}),
-            CAPTION + place * SIDE,
-        )
+        hero = model.encode(views={view: drawing for view, drawing in row.items()})
+        top = CAPTION + place * SIDE
         for column, drawing in enumerate(row.values()):
             shown = Image.fromarray(bytes_on_white(drawing))
             picture.paste(

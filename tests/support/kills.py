@@ -20,10 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from charnerf.interruption import Stopped, listening
 from charnerf.process import use_fastest_products
 from charnerf.training import run, trainer
+from charnerf.training.board import BY_TIME
 from support import small_runs
 
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -126,13 +128,20 @@ def _wait(process: int, seconds: float | None = None) -> int | None:
     return None
 
 
-def _result(folder: Path) -> tuple[bytes, list[dict[str, str]]]:
-    """Weights and curve of a run, seconds left out."""
+def _result(folder: Path) -> tuple[bytes, list[dict[str, str]], list[tuple[str, int]]]:
+    """Weights, curve and TensorBoard's points of a run, seconds left out."""
     with (folder / "curve.csv").open() as file:
         rows = [
             {key: one for key, one in row.items() if key not in NOT_STEPS} for row in csv.DictReader(file)
         ]
-    return (folder / "weights.safetensors").read_bytes(), rows
+    return (folder / "weights.safetensors").read_bytes(), rows, _points(folder / "tensorboard")
+
+
+def _points(folder: Path) -> list[tuple[str, int]]:
+    """Tags and steps as TensorBoard's own reader finds them, one that comes twice twice."""
+    events = EventAccumulator(str(folder), size_guidance={"scalars": 0}, purge_orphaned_data=False).Reload()
+    tags = [tag for tag in events.Tags()["scalars"] if not tag.startswith(BY_TIME)]
+    return sorted((tag, event.step) for tag in tags for event in events.Scalars(tag))
 
 
 if __name__ == "__main__":

@@ -90,7 +90,7 @@ class Board(L.Callback):
         self._rays, self._since = 0.0, self.clock.seconds
 
     def on_validation_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        """Write what was measured, by steps and by training time; all of it is on disk before a checkpoint is."""
+        """Write what was measured, by steps and by training time."""
         assert isinstance(pl_module, TrainingModule)
         if trainer.sanity_checking or not trainer.is_global_zero:
             return
@@ -101,7 +101,18 @@ class Board(L.Callback):
                 self._add(tag, value)
                 name = f"{BY_TIME}/{tag.removeprefix('val/')}/phase_{phase}"
                 self.writer.add_scalar(name, value, self._milliseconds)
-        self.writer.flush()
+
+    def on_save_checkpoint(
+        self, trainer: L.Trainer, pl_module: L.LightningModule, checkpoint: dict[str, Any]
+    ) -> None:
+        """Put on the disk what a run that goes on from there will not write again."""
+        self._flush()
+
+    def on_exception(
+        self, trainer: L.Trainer, pl_module: L.LightningModule, exception: BaseException
+    ) -> None:
+        """Put on the disk what led there."""
+        self._flush()
 
     def finish(self, metrics: Mapping[str, Any]) -> None:
         """Write the final error and seconds, which the hyper-parameter table shows."""
@@ -138,6 +149,10 @@ class Board(L.Callback):
     def _add_summary(self, summary: Summary) -> None:
         assert self.writer.file_writer is not None
         self.writer.file_writer.add_summary(summary)
+
+    def _flush(self) -> None:
+        if self._writer is not None:
+            self._writer.flush()
 
     def _is_of_the_past(self, tag: str, step: int) -> bool:
         """Whether an event tells of training before now; what is written once a start or after training is written again."""

@@ -15,6 +15,7 @@ NAMES = (
     "127.0.0.1",
     "localhost",
 )  # by which a browser here may have been sent: any other is a page elsewhere that renamed itself
+MOST_PAGES = 8  # kept: a whole one takes some MiB
 HTML = "text/html; charset=utf-8"
 
 
@@ -59,6 +60,8 @@ class WatchServer(ThreadingHTTPServer):
                     self.watched.page(name, whole=whole).encode("utf-8", errors="backslashreplace"),
                 )
                 self._pages[name, whole] = before
+                if len(self._pages) > MOST_PAGES:
+                    del self._pages[next(iter(self._pages))]
             return before
 
 

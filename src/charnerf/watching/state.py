@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,6 +17,7 @@ from charnerf.training.run_lock import LOCK_FILE
 from charnerf.watching.history import SECONDS, History
 
 MOST_RUNS = 200  # below one folder
+MARKS = {"config.yaml", CELL_FILE}  # a run has one of them
 
 
 class Stage(StrEnum):
@@ -65,21 +67,17 @@ class State:
 
 
 def find_runs(folder: Path) -> list[Path]:
-    """The run that a folder is, or those below it, by name; a job's own files are none.
+    """The run that a folder is, or those below it, by name; hidden folders, and what lies in a run, hold none.
 
     Raises:
         DataError: If there is none, or there are too many to watch.
     """
-    if _is_run(folder):
-        return [folder]
-    runs = sorted(
-        {
-            file.parent
-            for pattern in ("config.yaml", CELL_FILE)
-            for file in folder.rglob(pattern)
-            if _is_run(file.parent)
-        }
-    )
+    runs = []
+    for place, folders, files in os.walk(folder):
+        if MARKS & set(files):
+            runs.append(Path(place))
+            folders.clear()
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
     if not runs:
         raise DataError(
             f"{folder}: found no run in it or below it, expected one that has begun; name its folder."
@@ -89,10 +87,6 @@ def find_runs(folder: Path) -> list[Path]:
             f"{folder}: found {len(runs)} runs below it, expected {MOST_RUNS} at most; name a grid or a run."
         )
     return runs
-
-
-def _is_run(folder: Path) -> bool:
-    return folder.name != ".hydra" and any((folder / name).is_file() for name in ("config.yaml", CELL_FILE))
 
 
 def read_state(run: Path, name: str, history: History) -> State:
