@@ -20,7 +20,7 @@ from charnerf.inference.hero import Hero
 
 ROUNDS = 500
 WARM, WINDOW = 10, 20  # rounds before the first that counts, and in a median
-SIZE = 48  # pixels
+SIZE = 96  # pixels
 
 
 def repeat_rows(source: Path, pictured: Pictured, *, rounds: int) -> list[dict[str, Any]]:

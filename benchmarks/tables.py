@@ -199,7 +199,7 @@ SECTIONS: dict[str, tuple[str, Show]] = {
     "repeats": (
         "Memory of repeated work",
         _table(
-            "The model loaded, a character encoded and rendered at 48 pixels, again and again in one process; and a baked character"
+            "The model loaded, a character encoded and rendered at 96 pixels, again and again in one process; and a baked character"
             " opened and rendered. Resident MiB, medians of 20 rounds; `growth` from those after the tenth to the last."
         ),
     ),
