@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from charnerf.cli.commands import run
+from charnerf.errors import DataError
+from charnerf.reporting import run_files
 from charnerf.reporting.blocks import Bullets, Code, Heading, Picture, Table, Text
 from charnerf.reporting.document import to_markdown
 
@@ -121,3 +123,14 @@ def test_markdown_holds_no_html_of_names(tmp_path: Path) -> None:
     text = to_markdown(blocks, tmp_path)
     assert "<" not in text and "\n# x" not in text
     assert to_markdown([Code("```\n<b>", "")], tmp_path).splitlines()[0] == "````"
+
+
+def test_tables_fill_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows of two bytes have every column in memory."""
+    monkeypatch.setattr(run_files, "MOST_CELLS", 100)
+    file = tmp_path / "curve.csv"
+    file.write_text("step,seconds\n" + "1\n" * 50)
+    assert len(run_files.read_curve(file)) == 50
+    file.write_text("step,seconds\n" + "1\n" * 51)
+    with pytest.raises(DataError, match=r"curve\.csv: found more than 50 rows of 2 columns"):
+        run_files.read_curve(file)

@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ _METRICS_KEYS = (
     "per_character",
     "seconds",
 )
+MOST_CELLS = 10_000_000  # of a table
 _VIEW_WORDS = ("method", "character", "view")
 
 Curve = list[dict[str, float]]
@@ -86,9 +88,14 @@ def _read_table(path: Path) -> tuple[list[str], list[dict[str, Any]]]:
     """
     try:
         reader = csv.DictReader(read_text(path).splitlines())
-        return [str(name) for name in reader.fieldnames or ()], list(reader)
+        names = [str(name) for name in reader.fieldnames or ()]
+        most = MOST_CELLS // max(1, len(names))
+        rows = list(islice(reader, most + 1))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: can not be read ({error}), expected a table that a run wrote.") from error
+    if len(rows) > most:  # a row of two bytes has all columns in memory
+        raise DataError(f"{path}: found more than {most} rows of {len(names)} columns, expected fewer.")
+    return names, rows
 
 
 def _finite_cells(row: Mapping[str, Any]) -> dict[str, float]:
