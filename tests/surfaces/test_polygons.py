@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from charnerf.errors import DataError
 from charnerf.surfaces.polygons import triangulate
 from support.polygon_files import LETTER_C
 
@@ -49,3 +50,8 @@ def test_polygons_of_no_area_do_no_harm():
     points = np.array(((0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 0, 0), (0, 0, 0)), float)
     (triangles,) = triangulate(points, [np.arange(5)])
     assert triangles.shape[1] == 3 and triangles.max() < 5
+
+
+def test_a_polygon_of_a_million_corners_is_refused():
+    with pytest.raises(DataError, match="a face has 1000000 corners, expected at most 10000"):
+        triangulate(np.zeros((3, 3)), [np.tile(np.arange(2), 500_000)])

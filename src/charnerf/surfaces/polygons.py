@@ -6,6 +6,7 @@ import numpy as np
 
 from charnerf.errors import DataError
 
+MOST_CORNERS = 10_000  # of a polygon; ears are clipped in the square of it
 _QUAD = np.array(((0, 1, 2), (2, 3, 0)))
 
 
@@ -20,8 +21,13 @@ def triangulate(vertices: np.ndarray, polygons: Sequence[np.ndarray]) -> list[np
         Of each polygon the corners of its triangles, (m, 3), as places in the polygon: 0 to k - 1.
 
     Raises:
-        DataError: If a vertex is not there.
+        DataError: If a vertex is not there, or a polygon has more corners than anybody models.
     """
+    largest = max(map(len, polygons), default=0)
+    if largest > MOST_CORNERS:
+        raise DataError(
+            f"a face has {largest} corners, expected at most {MOST_CORNERS}; export it as triangles."
+        )
     if any(polygon.min() < 0 or polygon.max() >= len(vertices) for polygon in polygons):
         raise DataError(f"a face names a vertex that is not one of {len(vertices)}; export it again.")
     triangles: list[np.ndarray] = [np.zeros((0, 3), np.int64)] * len(polygons)
