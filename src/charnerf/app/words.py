@@ -4,14 +4,15 @@ import re
 from pathlib import Path
 
 _SAID = (  # what a command line says, and what the page does
-    (r"If it looks the other way, say --side (\w+), or of a sheet --figure \w+=N\.", r"If it looks the other way, call it \1."),
+    (r"(If it (?:looks the other way|does)), say --side (\w+), or of a sheet --figure \w+=N\.", r"\1, call it \2."),
+    (r", save the figure with a transparent one, or take --segmenter rembg\.", ", or save the figure with a transparent one."),
+    (r"Give it alone, as `charnerf reconstruct SHEET -o DIR`, or crop", "Crop"),
     (r"--refine 30 adapts", "Refine (30 seconds) adapts"),
     (r"--symmetric,", "Symmetric,"),
     (r"--smooth 10 evens", "Smoothing (10) evens"),
     (r"--view back=FILE, or right=FILE for the other side:", "A drawing of the back, or of the other side:"),
     (r" \(--keep-ink leaves them\)", " (“Keep ink” leaves them)"),
     (r" \(docs/\w+\.md\)", ""),
-    (r"\s*Give views one by one: .*", " Give another picture."),
     (r": crop it to the views of one character, or give them one by one with --view\.", ": crop it to the views of one character."),
     (r"Install it by `pip install 'charnerf\[usd\]'`, or choose \.glb\.",
      "Whoever runs this page can install it: pip install 'charnerf[usd]'."),
