@@ -17,7 +17,7 @@ from charnerf.meshing.options import MeshOptions
 from charnerf.models.charnerf import CharNeRF
 from charnerf.volume.renderers.base import AbstractRenderer
 
-Work = Literal["render", "mesh"]
+Work = Literal["render", "bake and render", "mesh"]
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class PeakMemory:
 def peak_memory(
     work: Work, network: CharNeRF, renderer: AbstractRenderer, pictured: Pictured, *, size: int
 ) -> PeakMemory:
-    """Render a picture of size x size pixels, or make a mesh of a grid of size points a side, in a process of its own.
+    """Render a picture of size x size pixels, baking first where the renderer does, or make a mesh of a grid of size points a side.
 
-    On a CUDA device: in this process, by the allocator's own peak.
+    In a process of its own. On a CUDA device: in this one, by the allocator's own peak.
     """
     device = network.box[0].device
     task = (work, network, renderer, pictured, size, torch.get_num_threads())
@@ -64,9 +64,9 @@ def _measure(
             pixel_centres(4, 4)
         before = watch.peaks_mib().get("before", process_peak_mib())
         with watch.stage("work"), torch.no_grad():
-            if work == "render":
-                renderer.render_camera(scene, camera)
-            else:
+            if work == "mesh":
                 build_mesh(scene, views, MeshOptions(resolution=size, height=None))
+            else:
+                renderer.render_camera(renderer.prepared(scene), camera)
         peak = watch.peaks_mib().get("work", process_peak_mib())
     return PeakMemory(rise_mib=peak - before, seconds=watch.total_seconds("work"))

@@ -15,7 +15,7 @@ from benchmarks.builds import build_rows, large_network
 from benchmarks.grids import grid_share
 from benchmarks.hull_cut import cut_by_hull
 from benchmarks.losses import compared_curves, loss_curves
-from benchmarks.memory import peak_memory
+from benchmarks.memory import Work, peak_memory
 from benchmarks.meshes import mesh_rows
 from benchmarks.plots import plot_growth, plot_kinds, plot_losses
 from benchmarks.precision import compiled_methods, precision_methods
@@ -161,9 +161,10 @@ def _memory(setting: Setting) -> list[dict[str, Any]]:
     """Rise of resident memory by image side and grid side, each in a fresh process."""
     bench, pictured = setting.bench, setting.pictured[0]
     rows = []
-    for work in ("render", "mesh"):
+    works: dict[Work, str] = {"render": ADAPTIVE, "bake and render": BAKED, "mesh": ADAPTIVE}
+    for work, renderer in works.items():
         for side in MEMORY_SIDES:
-            peak = peak_memory(work, bench.network, bench.renderers[ADAPTIVE], pictured, size=side)
+            peak = peak_memory(work, bench.network, bench.renderers[renderer], pictured, size=side)
             rows.append({"work": work, "side": side, **vars(peak)})
     return rows
 

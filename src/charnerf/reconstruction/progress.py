@@ -8,8 +8,8 @@ from charnerf.progress import Progress
 from charnerf.reconstruction.options import ReconstructionOptions
 
 # seconds on two cores
-ENCODE, BAKE, WRITE = 1.0, 18.0, 3.0
-FRAME = 0.4  # of 192 pixels
+ENCODE, BAKE, WRITE = 1.0, 6.0, 3.0
+FRAME = 0.1  # of 192 pixels
 SURFACE = 4.0  # of a grid of 128
 TEXTURE = 1.0 / 4000.0  # a face
 ALL_FACES = 30_000  # of a grid of 128
