@@ -167,6 +167,8 @@ def test_a_folder_without_assets_is_one_error_with_the_next_step(broken, tmp_pat
         (WEIGHTS, b"[]"),
         (WEIGHTS, json.dumps({"weights": {"tail": [[0, 1.0]]}}).encode()),
         (WEIGHTS, json.dumps({"weights": {"head": [[10**6, 1.0]]}}).encode()),
+        (WEIGHTS, json.dumps({"weights": {"head": [[0, 1.0]]}}).encode()),
+        (f"{WORN}/clothes/shoes01/shoes.mhclo", b"obj_file ../../../shoes.obj\nverts 0\n1\n"),
         (f"{WORN}/clothes/shoes01/shoes.mhclo", b"obj_file shoes.obj\n"),
         (f"{PICTURES}/proxies/clothes/shoes01/textures/red.png", b"\x89PNG\r\n"),
     ],

@@ -42,7 +42,12 @@ def test_a_cut_takes_away_what_the_cutter_holds_and_shows_its_colour():
     on_column = np.abs(whole.vertices[:, :2]).max(axis=1) < 0.6
     blue = np.all(np.isclose(whole.colors, BLUE), axis=1)
     assert blue.any() and (blue <= on_column).all()
-    assert len(united([box((1, 1, 1), RED)], [box((2, 2, 2), BLUE)]).faces) == 0
+
+
+def test_cuts_that_part_or_swallow_a_piece_are_left_out():
+    for half in ((2.0, 2.0, 2.0), (2.0, 2.0, 0.2)):
+        whole = united([box((1, 1, 1), RED)], [box(half, BLUE)])
+        assert mesh_of(whole.vertices, whole.faces).volume == pytest.approx(8.0)
 
 
 @pytest.mark.parametrize("seed", range(6))

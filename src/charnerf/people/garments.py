@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from charnerf.files import inside
 from charnerf.people.assets import Assets
 from charnerf.people.polygons import GroupedMesh, parse_obj
 
@@ -77,9 +78,9 @@ def read_garment(assets: Assets, folder: Path) -> Garment:
     """
     file = next(iter(sorted(folder.glob("*.mhclo"))), folder / f"{folder.name}.mhclo")
     fitting = assets.read(file, _parse_fitting)
-    material = folder / fitting.material_file
+    material = inside(folder, fitting.material_file, str(file))
     picture = assets.read(material, _parse_picture) if material.is_file() else ""
-    return Garment(assets.read(folder / fitting.mesh_file, parse_obj), fitting, picture)
+    return Garment(assets.read(inside(folder, fitting.mesh_file, str(file)), parse_obj), fitting, picture)
 
 
 def _parse_picture(content: bytes) -> str:

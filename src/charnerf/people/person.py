@@ -28,7 +28,7 @@ from charnerf.people.rig import Rig, posed_bones, read_rig, skinned
 from charnerf.surfaces.color import linear_from_srgb
 from charnerf.surfaces.surface_mesh import CUTOFF, SurfaceMaterial, SurfaceMesh, make_texture
 
-PEOPLE_VERSION = 1  # raise it whenever the people of a seed change: caches are named after it
+PEOPLE_VERSION = 2  # raise it whenever the people of a seed change: caches are named after it
 _ARMOURED, _SKIRTED, _HATTED, _BALD, _STYLISED = 0.35, 0.25, 0.12, 0.08, 0.4  # shares of the people
 
 
@@ -157,15 +157,18 @@ def _one(rng: np.random.Generator, figure: _Figure, kind: str, pattern: str) -> 
 
 
 def _armour(rng: np.random.Generator, figure: _Figure) -> None:
-    """Plates over parts of the body, two colours in all."""
+    """Plates over parts of the body, shades of two colours; most helmets leave the face free."""
     faces = figure.base.faces[body_faces(figure.base)]
     normals = vertex_normals(figure.body, faces)
     colors = [metal_color(rng) for _ in range(2)]
-    for bones, farthest in PLATES.values():
+    for name, (bones, farthest) in PLATES.items():
         covered = figure.rig.shares(*bones) > rng.uniform(0.3, 0.6)
+        if name == "helmet" and rng.random() < 0.75:
+            depths = figure.body[covered, 2]
+            covered &= figure.body[:, 2] < (0.5 * (depths.min() + depths.max()) if len(depths) else 0.0)
         if rng.random() < 0.6:
             plate = figure.body + float(rng.uniform(0.12, farthest)) * normals
-            color = colors[int(rng.integers(2))]
+            color = np.clip(colors[int(rng.integers(2))] * rng.uniform(0.75, 1.2), 0.0, 1.0)
             figure.add(plate, figure.rig.weights, faces[covered[faces].all(axis=1)], color)
 
 

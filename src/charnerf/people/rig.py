@@ -46,6 +46,7 @@ def read_rig(assets: Assets, base: GroupedMesh) -> Rig:
 
     Raises:
         KeyError: If it names a bone or a joint that is not there.
+        ValueError: If a vertex hangs on no bone.
     """
     described: dict[str, Any] = assets.json(RIG)
     described = described.get("bones", described)
@@ -64,7 +65,10 @@ def read_rig(assets: Assets, base: GroupedMesh) -> Rig:
     for bone, entries in assets.json(WEIGHTS)["weights"].items():
         for vertex, weight in entries:
             weights[int(vertex), bones.index(bone)] += weight
-    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
+    sums = weights.sum(axis=1, keepdims=True)
+    if not (sums > 0.0).all():
+        raise ValueError(f"{int((sums <= 0.0).sum())} vertices hang on no bone")
+    weights /= sums
     parents = tuple(
         bones.index(described[bone]["parent"]) if described[bone]["parent"] else -1 for bone in bones
     )
@@ -74,7 +78,10 @@ def read_rig(assets: Assets, base: GroupedMesh) -> Rig:
 def _joint(head: dict[str, Any], base: GroupedMesh) -> np.ndarray:
     """Vertices whose mean is a joint."""
     if head["strategy"] == "CUBE":
-        return np.unique(base.faces[base.group(head["cube_name"])])
+        cube = np.unique(base.faces[base.group(head["cube_name"])])
+        if not len(cube):
+            raise KeyError(head["cube_name"])
+        return cube
     return np.atleast_1d(head["vertex_index"] if head["strategy"] == "VERTEX" else head["vertex_indices"])
 
 

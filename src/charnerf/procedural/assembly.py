@@ -20,7 +20,7 @@ from charnerf.procedural.textures import Color
 from charnerf.surfaces.color import linear_from_srgb
 from charnerf.surfaces.surface_mesh import SurfaceMaterial, SurfaceMesh
 
-SHAPES_VERSION = 1  # raise it whenever the shapes of a seed change: caches are named after it
+SHAPES_VERSION = 2  # raise it whenever the shapes of a seed change: caches are named after it
 REACH = 1.2  # m: farthest to a side
 _FIGURES, _STACKS = 0.5, 0.2  # shares of the shapes; the rest are clusters
 _CUT = 0.35  # share of the shapes that pieces are cut out of
@@ -44,8 +44,6 @@ def make_shape(seed: int) -> SurfaceMesh:
         [_cutter(rng, solids, colors) for _ in range(int(rng.integers(1, 4)))] if rng.random() < _CUT else []
     )
     whole = united(solids, cutters)
-    if len(whole.faces) == 0:
-        whole = united(solids)
     return surface_of(whole, _standing(whole.vertices))
 
 

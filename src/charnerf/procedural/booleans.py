@@ -10,12 +10,14 @@ from charnerf.procedural.solids import Solid
 def united(solids: Sequence[Solid], cutters: Sequence[Solid] = ()) -> Solid:
     """The outer surface of solids together, less what cutters take away; cut faces show the cutters' colours.
 
+    A cutter that would part a piece in two, or take a whole one away, is left out.
+
     Args:
         solids: Closed surfaces that may overlap; at least one.
         cutters: Closed surfaces.
 
     Returns:
-        One closed surface; without faces if nothing is left.
+        One closed surface.
     """
     from manifold3d import Manifold, Mesh, OpType
 
@@ -26,8 +28,10 @@ def united(solids: Sequence[Solid], cutters: Sequence[Solid] = ()) -> Solid:
         )
 
     together = Manifold.batch_boolean([manifold(solid) for solid in solids], OpType.Add)
+    pieces = len(together.decompose())
     for cutter in cutters:
-        together = together - manifold(cutter)
+        left = together - manifold(cutter)
+        together = left if len(left.decompose()) == pieces else together
     mesh = together.to_mesh()
     values = np.asarray(mesh.vert_properties, dtype=np.float64)
     return Solid(values[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64), np.clip(values[:, 3:6], 0.0, 1.0))
