@@ -159,6 +159,7 @@ def test_no_script_of_a_file_runs(files):
 
 def test_what_lies_elsewhere_is_refused_by_name(files):
     assert "outside.png" in _refusal(files / "own" / "picture.blend")
+    assert "outside.wav" in _refusal(files / "own" / "sound.blend")
     assert "two.blend" in _refusal(files / "own" / "linked.blend")
 
 

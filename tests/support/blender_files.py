@@ -7,6 +7,7 @@ apart from sRGB's ends so that errors show.
 import json
 import struct
 import sys
+import wave
 from math import radians
 from pathlib import Path
 
@@ -158,6 +159,13 @@ def make_evil(folder: Path) -> None:
     image.save()
     image.unpack(method="REMOVE")
     save(folder / "own" / "picture.blend")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with wave.open(str(folder / "outside.wav"), "wb") as sound:
+        sound.setparams((1, 1, 8000, 1, "NONE", ""))
+        sound.writeframes(b"0")
+    make_figure()
+    bpy.data.sounds.load(str(folder / "outside.wav")).use_fake_user = True
+    save(folder / "own" / "sound.blend")
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with bpy.data.libraries.load(str(folder / "two.blend"), link=True) as (there, taken):
         taken.objects = list(there.objects)

@@ -43,8 +43,11 @@ def _prepare() -> None:
     render = bpy.context.scene.render
     render.engine = "CYCLES"
     render.bake.margin, render.bake.use_clear, render.bake.target = _MARGIN, True, "IMAGE_TEXTURES"
-    bpy.context.scene.cycles.samples = _SAMPLES
-    bpy.context.scene.cycles.use_adaptive_sampling = False
+    cycles = bpy.context.scene.cycles
+    cycles.samples, cycles.film_exposure = _SAMPLES, 1.0
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    if hasattr(cycles, "shading_system"):
+        cycles.shading_system = False  # OSL runs what a file brings along
 
 
 def _lay_out(flat: bpy.types.Object, slots: Mapping[int, bpy.types.Material]) -> None:
@@ -90,7 +93,14 @@ def _bake(
             tree.links.new(emission.outputs[0], output.inputs["Surface"])
             images[slot] = image
     _select(flat)
-    bpy.ops.object.bake(type="EMIT", margin=_MARGIN, use_clear=True, uv_layer=_UV_MAP)
+    bpy.ops.object.bake(
+        type="EMIT",
+        target="IMAGE_TEXTURES",
+        save_mode="INTERNAL",
+        margin=_MARGIN,
+        use_clear=True,
+        uv_layer=_UV_MAP,
+    )
     for tree, *link in shown:  # other objects may have the material too
         tree.links.new(*link)
     return images

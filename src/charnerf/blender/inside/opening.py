@@ -41,6 +41,16 @@ def open_file(file: Path) -> list[str]:
         raise Refused(
             f"links to other files ({', '.join(linked)}); make everything local (Object > Relations > Make Local)"
         )
+    pictures = {
+        bpy.path.abspath(image.filepath) for image in bpy.data.images
+    }  # `check_pictures` looks at those that are used
+    outside = sorted(
+        path
+        for path in set(bpy.utils.blend_paths(absolute=True, packed=False)) - pictures
+        if Path(path).exists() and not _is_in(Path(path), file.parent)
+    )
+    if outside:
+        raise Refused(f"uses files outside its folder ({', '.join(outside)}); put them there, or pack them")
     return ["its scripts and scripted drivers were not run"] if bpy.app.autoexec_fail else []
 
 
