@@ -19,6 +19,7 @@ from charnerf.drawings.redrawn import redrawn
 from charnerf.evaluation.character import OURS, CharacterResult, measure_character
 from charnerf.evaluation.frames import fixed_views
 from charnerf.evaluation.lpips import Lpips
+from charnerf.evaluation.scores import summarize
 from charnerf.models.charnerf import CharNeRF
 from charnerf.procedural import make_character
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -63,14 +64,11 @@ def drawn_levels(
     return rows
 
 
-def _means(results: Sequence[CharacterResult]) -> dict[str, float]:
+def _means(results: Sequence[CharacterResult]) -> dict[str, Any]:
     """Over a character's views, then over characters."""
-    metrics = {
-        name: fmean(fmean(view[name] for view in one.scores[OURS].views) for one in results)
-        for name in METRICS
-    }
+    means = summarize([one.scores[OURS] for one in results])
     seconds = {
         f"{stage}_seconds": fmean(fmean(one.seconds[stage]) for one in results)
         for stage in ("encode", "render")
     }
-    return {**metrics, **seconds}
+    return {**{name: means[name] for name in METRICS}, **seconds}
