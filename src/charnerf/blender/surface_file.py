@@ -1,6 +1,7 @@
 """Surfaces as the files that travel between this process and Blender's."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,7 @@ def write_surface(file: Path, surface: SurfaceMesh) -> None:
     textures = {id(each.texture): each.texture for each in surface.materials if each.texture is not None}
     names = list(textures)
     materials = surface.materials
+    pictures: dict[str, Any] = {f"texture_{index}": textures[name].pixels for index, name in enumerate(names)}
     np.savez(
         file,
         triangles=surface.triangles,
@@ -45,7 +47,7 @@ def write_surface(file: Path, surface: SurfaceMesh) -> None:
         picture_of=np.array(
             [-1 if each.texture is None else names.index(id(each.texture)) for each in materials]
         ),
-        **{f"texture_{index}": textures[name].pixels for index, name in enumerate(names)},
+        **pictures,
     )
 
 

@@ -131,6 +131,7 @@ def _write(file: Path, parts: list[tuple[Any, ...]], textures: dict[str, np.ndar
             textures[look.image.name] = pixels_of(look.image)
     names = list(textures)
     looks = [look for look, *_ in parts]
+    pictures: dict[str, Any] = {f"texture_{index}": textures[name] for index, name in enumerate(names)}
     np.savez(
         file,
         triangles=np.concatenate([part[1] for part in parts]),
@@ -140,5 +141,5 @@ def _write(file: Path, parts: list[tuple[Any, ...]], textures: dict[str, np.ndar
         factors=np.array([look.factor for look in looks], np.float32),
         cutoffs=np.array([np.nan if look.cutoff is None else look.cutoff for look in looks]),
         picture_of=np.array([-1 if look.image is None else names.index(look.image.name) for look in looks]),
-        **{f"texture_{index}": textures[name] for index, name in enumerate(names)},
+        **pictures,
     )
