@@ -11,9 +11,8 @@ from charnerf.errors import ConfigError
 
 log = logging.getLogger(__name__)
 LOCK_FILE = ".run.lock"
-PATIENCE = (
-    120.0  # seconds for the processes of a command that was killed: they may write a checkpoint for a minute
-)
+# seconds for the processes of a command that was killed: on a busy machine they import for minutes before they notice
+PATIENCE = 300.0
 _TICK = 0.1
 
 
