@@ -244,3 +244,17 @@ def test_a_port_that_is_taken_is_told(server, capsys):
     port = str(server.server_address[1])
     assert charnerf(["watch", str(server.watched.folder), "--port", port]) == 1
     assert f"--port {port}: " in capsys.readouterr().err
+
+
+def test_a_record_of_a_page_is_refused_before_it_is_served(tmp_path, capsys):
+    assert charnerf(["watch", str(tmp_path), "--json", "-"]) == 2
+    assert "--json: found without --once" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("error", "told"), [(BrokenPipeError(), False), (ZeroDivisionError(), True)])
+def test_a_page_that_is_closed_while_it_is_answered_is_no_error(server, capsys, error, told):
+    try:
+        raise error
+    except (OSError, ArithmeticError):
+        server.handle_error(None, ("127.0.0.1", 1))
+    assert ("Traceback" in capsys.readouterr().err) is told

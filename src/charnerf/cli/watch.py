@@ -8,7 +8,7 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.cli.summary import JsonFile, Summary, check_json, close, show
-from charnerf.errors import DataError
+from charnerf.errors import ConfigError, DataError
 from charnerf.wording import counted
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ def command(
 
     began = time.perf_counter()
     check_json(json_file)
+    if json_file is not None and not once:
+        raise ConfigError("--json: found without --once, expected both; a page is served until Ctrl-C.")
     watched = WatchedFolder(folder)
     if not once:
         try:

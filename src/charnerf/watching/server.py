@@ -1,5 +1,6 @@
 """The page of a watched folder over HTTP, for this machine alone."""
 
+import sys
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -63,6 +64,11 @@ class WatchServer(ThreadingHTTPServer):
                 if len(self._pages) > MOST_PAGES:
                     del self._pages[next(iter(self._pages))]
             return before
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Tell what failed; a page that was closed while it was answered has not."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 @final
