@@ -239,3 +239,9 @@ def test_the_rules_bite(tmp_path: Path) -> None:
     file = tmp_path / "x.py"
     file.write_text("def f():\n    from charnerf import cli\n    import lightning.pytorch\n")
     assert list(imports_of(file)) == [(2, "charnerf.cli"), (3, "lightning.pytorch")]
+
+
+def test_no_two_test_files_share_a_name() -> None:
+    """pytest imports them by their names alone."""
+    names = [file.name for file in (ROOT / "tests").rglob("test_*.py")]
+    assert len(names) == len(set(names)), sorted(name for name in names if names.count(name) > 1)

@@ -48,9 +48,9 @@ def test_a_closed_terminal_lets_what_is_at_hand_become_whole(tmp_path):
     code = """
         import os, signal, sys, time
         from charnerf.interruption import Stopped, held, listening, requested
-        print("ready", flush=True)
         try:
             with listening(), held():
+                print("ready", flush=True)
                 while requested() is None:
                     time.sleep(0.01)
                 os.kill(os.getpid(), signal.SIGHUP)

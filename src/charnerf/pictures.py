@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 import torch
-from PIL import Image, ImageFont
+from PIL import Image, ImageFont, UnidentifiedImageError
 from scipy import ndimage
 from torch import Tensor
 
@@ -79,6 +79,8 @@ def open_picture(source: Path | bytes, name: str | None = None) -> Iterator[Imag
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # our own check, with the file's name
         try:
             picture = Image.open(stream, formats=readable_formats())
+        except UnidentifiedImageError as error:  # which names the stream
+            raise UnidentifiedImageError("of none of the formats that are read") from error
         finally:
             Image.MAX_IMAGE_PIXELS = limit
         with picture:

@@ -187,8 +187,8 @@ def write_character(
         raise DataError(f"{target}: is there already; rename the character or remove that folder.")
     aside = root / f"{_PARTIAL}{os.getpid()}-{name}"
     shutil.rmtree(aside, ignore_errors=True)
-    aside.mkdir(parents=True)
     try:
+        aside.mkdir(parents=True)  # in here: a signal that comes meanwhile is answered right behind it
         _write_pictures(aside, pictures)
         if write_mesh is not None:
             mesh_file = aside / MESH_FILE

@@ -246,8 +246,8 @@ def _unpack(root: Path, shard: Shard, content: bytes) -> None:
     for name, members in zip(shard.names, samples, strict=True):
         aside = root / f".partial-{os.getpid()}-{name}"
         shutil.rmtree(aside, ignore_errors=True)
-        aside.mkdir()
         try:
+            aside.mkdir()
             for member, body in members.items():
                 file = inside(aside, member, where)
                 try:
