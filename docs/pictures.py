@@ -1,4 +1,4 @@
-"""Make the pictures of docs/gallery.md: `python -m docs.pictures --meshes FOLDER --drawn FOLDER`.
+"""Make the pictures of docs/gallery.md and the examples of the page: `python -m docs.pictures --meshes FOLDER --drawn FOLDER`.
 
 FOLDER/NAME.glb and FOLDER/NAME/VIEW.png are the characters that docs/gallery/pictures.csv names; they stay where they are. Without
 one of the options its picture is left as it is.
@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 import charnerf
+from charnerf.app.examples import write_examples
 from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.lights import Unlit
 from charnerf.cli import run
@@ -46,6 +47,7 @@ def main() -> None:
         if place is not None:
             found = [drawings(place, row) for row in rows if row["picture"] == kind]
             sheet(model, found).quantize(COLORS).save(FOLDER / f"{kind}.png", optimize=True)
+    write_examples(Path(charnerf.__file__).parent / "app" / "examples")
 
 
 def drawings(place: Path, row: Mapping[str, str]) -> Drawings:
