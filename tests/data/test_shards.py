@@ -106,6 +106,33 @@ def test_over_http(shards: Path, tmp_path: Path) -> None:
         server.shutdown()
 
 
+@pytest.mark.slow
+def test_over_s3(shards: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A server of its own that speaks S3: pip install 'moto[server]' s3fs."""
+    server_module = pytest.importorskip("moto.server")
+    s3fs = pytest.importorskip("s3fs")
+    server = server_module.ThreadedMotoServer(ip_address="127.0.0.1", port=0)
+    server.start()
+    try:
+        host, port = server.get_host_and_port()
+        for name, value in {
+            "AWS_ENDPOINT_URL": f"http://{host}:{port}",
+            "AWS_ACCESS_KEY_ID": "anybody",
+            "AWS_SECRET_ACCESS_KEY": "anything",
+            "AWS_DEFAULT_REGION": "us-east-1",
+        }.items():
+            monkeypatch.setenv(name, value)
+        bucket = s3fs.S3FileSystem(skip_instance_cache=True)
+        bucket.mkdir("characters")
+        bucket.put(str(shards), "characters/packed", recursive=True)
+        root = data("s3://characters/packed", tmp_path).prepare()
+        assert load_character(root, "cat").source_names == ("front", "side", "back")
+        with pytest.raises(DataError, match=r"s3://characters/elsewhere/index\.json: can not be fetched"):
+            data("s3://characters/elsewhere", tmp_path).prepare()
+    finally:
+        server.stop()
+
+
 class _Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_: object) -> None:
         """Say nothing."""
