@@ -249,6 +249,7 @@ def made(server, eggs) -> str:
     async def story() -> str:
         studio = server.studio
         session = studio.open()
+        studio.came(session)  # a job without a page is cancelled soon
         for index, drawing in enumerate(eggs.values()):
             file = studio.reader.new_picture(session, drawing.name)
             file.write_bytes(drawing.read_bytes())
@@ -258,6 +259,8 @@ def made(server, eggs) -> str:
         studio.queue.build(session, read_plan(QUICK))
         while session.job.is_active:
             await asyncio.sleep(0.05)
+        assert session.job.state == "done", session.job.problem
+        studio.left(session)
         return f"{server.address}#{session.name}"
 
     return asyncio.run_coroutine_threadsafe(story(), server.loop).result()
