@@ -1,5 +1,6 @@
 """Levels of drawings that disagree in the benchmark: level 0 is what is captured, further ones are drawn and read."""
 
+import pytest
 import torch
 
 from charnerf.bench.levels import METRICS, VIEWS, characters_of, drawn_levels
@@ -10,6 +11,7 @@ from support import tiny_models
 from support.subjects import LIKE
 
 
+@pytest.mark.slow
 def test_a_level_is_a_row_and_level_0_is_as_captured(tmp_path):
     torch.manual_seed(1)
     network = tiny_models.shake(tiny_models.tiny_model(), scale=0.15).requires_grad_(False).eval()

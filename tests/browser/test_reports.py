@@ -103,7 +103,11 @@ def test_a_mesh_is_not_loaded_before_it_is_near(reports, open_page):
     page.locator("charnerf-mesh").first.scroll_into_view_if_needed()
     assert drawn(page).std() > 5.0
     page.evaluate("scrollTo(0, 0)")
-    page.wait_for_function("!document.querySelector('charnerf-mesh').renderer")  # the GPU is given back
+    for _ in range(200):  # what playwright waits by, the page's policy forbids
+        if page.evaluate("!document.querySelector('charnerf-mesh').renderer"):
+            break
+        page.wait_for_timeout(50)
+    assert page.evaluate("!document.querySelector('charnerf-mesh').renderer")  # the GPU is given back
 
 
 def test_a_mesh_turns_and_changes_from_the_keyboard(reports, open_page):
