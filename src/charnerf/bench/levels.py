@@ -9,9 +9,7 @@ from statistics import fmean
 from typing import Any
 
 from charnerf.bench.subjects import TARGET_VIEWS
-from charnerf.capture.character import CaptureOptions
-from charnerf.capture.dataset import capture_scene_to
-from charnerf.capture.generated import character_seed
+from charnerf.capture.generated import generate_dataset
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.artist import LEVELS
@@ -21,7 +19,6 @@ from charnerf.evaluation.frames import fixed_views
 from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.scores import summarize
 from charnerf.models.charnerf import CharNeRF
-from charnerf.procedural import make_character
 from charnerf.volume.renderers.base import AbstractRenderer
 
 VIEWS = 4  # of a character
@@ -30,13 +27,10 @@ METRICS = ("psnr", "psnr_foreground", "ssim", "lpips", "silhouette_iou", "haze")
 
 def characters_of(data: Path | None, split: str, count: int, *, folder: Path, size: int) -> list[Character]:
     """The first characters of a split; embedded ones, captured into a folder, without a data set."""
-    if data is not None:
-        return [load_character(data, name) for name in names_of(read_dataset(data), split)[:count]]
-    names = [f"test-{index:05d}" for index in range(count)]
-    options = CaptureOptions(views=TARGET_VIEWS, size=size)
-    for index, name in enumerate(names):
-        capture_scene_to(folder, name, make_character(character_seed(0, "test", index)), options)
-    return [load_character(folder, name) for name in names]
+    if data is None:
+        generate_dataset(folder, 0, 0, count, 0, views=TARGET_VIEWS, size=size, processes=1)
+        data, split = folder, "test"
+    return [load_character(data, name) for name in names_of(read_dataset(data), split)[:count]]
 
 
 def drawn_levels(
