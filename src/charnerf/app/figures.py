@@ -70,7 +70,7 @@ def in_order(figures: Iterable[Figure]) -> list[Figure]:
         DataError: If two show one view, or there are fewer than two.
     """
     used = [(viewpoint(one.view), one) for one in figures if one.is_used]
-    used.sort(key=lambda pair: (min(pair[0].azimuth_deg, 360.0 - pair[0].azimuth_deg), pair[0].azimuth_deg))
+    used.sort(key=lambda pair: pair[0].rank)
     names = [view.name for view, _ in used]
     for name in names:
         if names.count(name) > 1:

@@ -74,7 +74,7 @@ def read_sheet(
     views, doubtful = _views(drawing, canvases, order, figures or {})
     chosen = [(view, index) for index, view in views.items() if view is not None]
     shown = [view.name for view, _ in chosen]
-    chosen.sort(key=lambda pair: (min(pair[0].azimuth_deg, 360.0 - pair[0].azimuth_deg), pair[0].azimuth_deg))
+    chosen.sort(key=lambda pair: pair[0].rank)
     return SheetViews(
         drawings={view: sheet.figures[index].drawing.rgba for view, index in chosen},
         assumptions=(

@@ -51,6 +51,11 @@ class Viewpoint:
         object.__setattr__(self, "elevation_deg", float(self.elevation_deg))
 
     @property
+    def rank(self) -> tuple[float, float]:
+        """Sorts views of a sheet as they rule where they disagree: front, sides, back, a left one before a right one."""
+        return min(self.azimuth_deg, 360.0 - self.azimuth_deg), self.azimuth_deg
+
+    @property
     def name(self) -> str:
         """Its name where it has one, else its angles."""
         if self.elevation_deg == 0.0:
