@@ -11,9 +11,10 @@ from charnerf.doctor.picture_files import picture_findings
 from charnerf.doctor.repairs import mirror_command
 from charnerf.drawings.align import figure_box, on_one_scale
 from charnerf.drawings.cutout import cut_out
+from charnerf.drawings.doubts import DoubtKind
 from charnerf.drawings.load import load_drawing
 from charnerf.drawings.naming import looks_left
-from charnerf.drawings.turnaround import LOOKS, read_views
+from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import AZIMUTHS, Viewpoint
 from charnerf.errors import DataError
 from charnerf.pictures import on_white, to_bytes
@@ -21,6 +22,7 @@ from charnerf.pictures import on_white, to_bytes
 SIZE = 128  # pixels at which views are compared
 SCALES = 1.1  # of the tallest figure over the shortest, in pictures of one size
 NAMES = ("front", "side", "back", *AZIMUTHS)
+FAULTS = {DoubtKind.MIRRORED: "mirrored picture", DoubtKind.COPIED: "duplicated view"}
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -115,17 +117,10 @@ def _together(whole: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
             "",
         )
         return
-    for warning in read.warnings:
-        where, _, found = warning.partition(": ")
-        fault = (
-            "mirrored picture"
-            if "unmirrored" in warning or LOOKS in warning
-            else "duplicated view"
-            if "shows the same" in warning
-            else ""
-        )
-        command = mirror_command(Path(where)) if fault == "mirrored picture" else ""
+    for doubt in read.doubts:
+        fault = FAULTS.get(doubt.kind)
+        command = mirror_command(Path(doubt.about)) if doubt.kind is DoubtKind.MIRRORED else ""
         yield Finding(
-            fault or "drawings that disagree", where, found, "views that agree", "Mend the drawing.", command,
-            picture=read.picture, is_broken=bool(fault),
+            fault or "drawings that disagree", doubt.about, doubt.sentence, "views that agree", "Mend the drawing.", command,
+            picture=read.picture, is_broken=fault is not None,
         )  # fmt: skip

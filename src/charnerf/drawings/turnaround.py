@@ -10,6 +10,7 @@ import torch
 
 from charnerf.drawings.align import FigureBox, figure_box, half_extent, place
 from charnerf.drawings.cutout import Cutout, cut_out, see_through
+from charnerf.drawings.doubts import Doubt, DoubtKind
 from charnerf.drawings.enclosed import shared
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
@@ -28,7 +29,6 @@ from charnerf.types import SourceViews
 Picture = str | Path | np.ndarray
 LEAST_AGREEMENT = 0.85  # IoU of two outlines that ought to be one; below, the user is warned
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
-LOOKS = "by the colours of front and back it looks"  # of a profile named after its other side
 NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 
 
@@ -44,7 +44,7 @@ class Turnaround:
         given_alphas: The views' masks before they were reconciled, (V, S, S).
         reconciliation: How the views agree, and what was moved.
         assumptions: What was done and assumed, plain sentences.
-        warnings: What looks wrong, plain sentences.
+        doubts: What looks wrong.
         picture: RGB uint8 contact sheet: outlines, height line and floor line drawn into the aligned figures.
     """
 
@@ -55,8 +55,13 @@ class Turnaround:
     given_alphas: np.ndarray
     reconciliation: Reconciliation
     assumptions: tuple[str, ...]
-    warnings: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
     picture: np.ndarray
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What looks wrong, plain sentences."""
+        return tuple(map(str, self.doubts))
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ def read_views(
             *inked,
             *_mended(agreement, names, options.reconciled),
         ),
-        warnings=_doubts(figures, given, extent, agreement),
+        doubts=_doubts(figures, given, extent, agreement),
         picture=draw_assumptions(
             given, canvases, list(names), [figure.drawing.name for figure in figures], extent
         ),
@@ -241,50 +246,59 @@ def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[s
 
 def _doubts(
     figures: Sequence[_Figure], canvases: Sequence[np.ndarray], extent: float, agreement: Reconciliation
-) -> tuple[str, ...]:
+) -> tuple[Doubt, ...]:
     """What looks wrong."""
     small = _small_figures(figures, extent, canvases[0].shape[0])
     between = [
-        f"{one.name}: seen from between front, side and back, which the released weights were trained on: with it pictures came out"
-        " worse (docs/drawings.md). Compare without it."
+        Doubt(
+            one.name,
+            "seen from between front, side and back, which the released weights were trained on: with it pictures came out worse"
+            " (docs/drawings.md). Compare without it.",
+        )
         for one in between_square_ones([figure.viewpoint for figure in figures])
     ]
     apart = (*_disagreements(agreement, figures), *_other_designs(canvases, figures))
     return (*small, *_turned_sides(canvases, figures), *apart, *between)
 
 
-def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
+def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[Doubt]:
     return [
-        f"{figure.drawing.name}: the figure is {figure.box.height:.0f} pixels tall, fewer than the model reads: use a larger"
-        " picture."
+        Doubt(
+            figure.drawing.name,
+            f"the figure is {figure.box.height:.0f} pixels tall, fewer than the model reads: use a larger picture.",
+        )
         for figure in figures
         if figure.box.height * 2.0 * extent / HEIGHT < 0.5 * size
     ]
 
 
-def _turned_sides(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[str]:
+def _turned_sides(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[Doubt]:
     """Profiles whose front half has the back's colours, so that they look to the other side than their names say."""
     shown = {figure.viewpoint.name: canvas for figure, canvas in zip(figures, canvases, strict=True)}
-    lines = []
+    doubts = []
     for figure in figures:
         name = figure.viewpoint.name
         if name not in ("left", "right") or not {"front", "back"} <= set(shown):
             continue
         if colors_look_left(shown[name], shown["front"], shown["back"]) == (name == "right"):
             other = "right" if name == "left" else "left"
-            lines.append(
-                f"{figure.drawing.name}: {LOOKS} to the picture's {other}, and so shows the"
-                f" character's {other} side. If it does, say --side {other}, or of a sheet --figure {other}=N."
+            sentence = (
+                f"by the colours of front and back it looks to the picture's {other}, and so shows the character's {other} side."
+                f" If it does, say --side {other}, or of a sheet --figure {other}=N."
             )
-    return lines
+            doubts.append(Doubt(figure.drawing.name, sentence, DoubtKind.MIRRORED))
+    return doubts
 
 
-def _other_designs(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[str]:
+def _other_designs(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[Doubt]:
     """Drawings in other colours than the first one's."""
     first, *others = [palette(canvas) for canvas in canvases]
     return [
-        f"{figure.drawing.name}: shares only {100 * share:.0f} % of its colours with {figures[0].drawing.name}: are both of one"
-        " character and design? Give drawings of one, or leave this out."
+        Doubt(
+            figure.drawing.name,
+            f"shares only {100 * share:.0f} % of its colours with {figures[0].drawing.name}: are both of one character and design?"
+            " Give drawings of one, or leave this out.",
+        )
         for figure, share in zip(figures[1:], (shared_colors(first, one) for one in others), strict=True)
         if share < FEW_SHARED
     ]
@@ -314,32 +328,34 @@ def _mended(agreement: Reconciliation, names: Sequence[str], reconciled: bool) -
     return lines
 
 
-def _disagreements(agreement: Reconciliation, figures: Sequence[_Figure]) -> list[str]:
+def _disagreements(agreement: Reconciliation, figures: Sequence[_Figure]) -> list[Doubt]:
     """What looks wrong between drawings."""
-    lines = []
+    doubts = []
     for figure, view in zip(figures, agreement.views, strict=True):
         name = figure.drawing.name
         if view.copies is not None:
-            first = figures[view.copies]
-            lines.append(
-                f"{name}: shows the same as {first.drawing.name}: was one file used twice? Give the {figure.viewpoint.name} view,"
-                " or leave it out."
+            sentence = (
+                f"shows the same as {figures[view.copies].drawing.name}: was one file used twice? Give the {figure.viewpoint.name}"
+                " view, or leave it out."
             )
+            doubts.append(Doubt(name, sentence, DoubtKind.COPIED))
         elif view.partner is not None and view.iou_unmirrored > view.iou_before + 0.02:
-            lines.append(
-                f"{name}: the {figure.viewpoint.name} fits the {figures[view.partner].viewpoint.name} better unmirrored (IoU"
+            sentence = (
+                f"the {figure.viewpoint.name} fits the {figures[view.partner].viewpoint.name} better unmirrored (IoU"
                 f" {view.iou_unmirrored:.2f} against {view.iou_before:.2f}): seen from the other side, left and right are swapped."
                 " Was it traced? Mirror the drawing if so."
             )
+            doubts.append(Doubt(name, sentence, DoubtKind.MIRRORED))
         if view.partner is not None and view.iou_before < LEAST_AGREEMENT:
-            lines.append(
-                f"{name}: its outline shares only {100 * view.iou_before:.0f} % with the mirrored"
+            sentence = (
+                f"its outline shares only {100 * view.iou_before:.0f} % with the mirrored"
                 f" {figures[view.partner].viewpoint.name}'s (IoU, expected {100 * LEAST_AGREEMENT:.0f} % or more): the drawings"
                 f" differ in pose, are not of one character, or were given in another order than front, side, back"
-                + ("." if view.is_trusted else "; it could not be reconciled, colours may be misplaced.")
             )
+            end = "." if view.is_trusted else "; it could not be reconciled, colours may be misplaced."
+            doubts.append(Doubt(name, sentence + end))
         if np.isinf(view.tolerance).all():
-            lines.append(
-                f"{name}: fits none of the views before it; it colours the figure but does not shape it."
+            doubts.append(
+                Doubt(name, "fits none of the views before it; it colours the figure but does not shape it.")
             )
-    return lines
+    return doubts
