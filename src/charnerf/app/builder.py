@@ -18,7 +18,7 @@ from charnerf.app.settings import FORMATS, Plan
 from charnerf.errors import DependencyError
 from charnerf.inference.hero import Hero
 from charnerf.inference.model import Model
-from charnerf.meshing.build import find_surface, finish_mesh
+from charnerf.meshing.build import finish_mesh
 from charnerf.meshing.export import save_mesh
 from charnerf.progress import Progress
 from charnerf.reconstruction.folder import Reconstruction, reconstruct
@@ -95,7 +95,7 @@ def _other_files(done: Reconstruction, plan: Plan, folder: Path) -> tuple[tuple[
         levels = [Level("mesh.glb", len(done.built.surface.faces))]
         if plan.levels:
             progress.stage("levels")
-            levels += _levels(done, plan, folder, progress.counter(len(plan.levels) + 1))
+            levels += _levels(done, plan, folder, progress.counter(len(plan.levels)))
             _zip(folder / "levels.zip", (folder / level.file for level in levels))
     return tuple(levels), tuple(notes)
 
@@ -104,13 +104,11 @@ def _other_files(done: Reconstruction, plan: Plan, folder: Path) -> tuple[tuple[
 def _levels(done: Reconstruction, plan: Plan, folder: Path, on_step: Callable[[], object]) -> list[Level]:
     """Write levels of detail: the mesh's own surface, decimated further and painted each for itself."""
     hero, options = done.hero, plan.options.mesh
-    found = find_surface(hero.scene, hero.views, options, level=done.built.level)
-    on_step()
     levels = []
     for number, faces in enumerate(plan.levels, start=1):
         built = finish_mesh(
             hero.scene,
-            found,
+            done.built.found,
             hero.views if hero.detailed is None else hero.detailed,
             replace(options, faces=faces),
         )

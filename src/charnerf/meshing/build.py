@@ -47,28 +47,51 @@ class BuiltMesh:
     Attributes:
         mesh: World frame, metres; vertex colours (sRGB) or a base-colour texture.
         surface: The same before its vertices were split at texture seams; `mesh` itself without a texture.
-        level: Density of the surface, 1/m.
-        choice: The evidence for the level; None where the caller gave it.
-        missed: Share of the drawings' pixels of the figure whose densities were raised to the level (see outlines.py).
-        num_extracted: Faces before decimation.
-        num_floaters: Parts dropped.
-        num_cavities: Hidden holes dropped.
-        left_out: Grid points not evaluated.
+        found: The surface that it was made of, with all of its faces.
         textured: How the texture came about; None where there is none.
         seconds: Time it took.
     """
 
     mesh: trimesh.Trimesh
     surface: trimesh.Trimesh
-    level: float
-    choice: LevelChoice | None
-    missed: float
-    num_extracted: int
-    num_floaters: int
-    num_cavities: int
-    left_out: LeftOut
+    found: FoundSurface
     textured: Textured | None
     seconds: float
+
+    @property
+    def level(self) -> float:
+        """Density of the surface, 1/m."""
+        return self.found.extraction.level
+
+    @property
+    def choice(self) -> LevelChoice | None:
+        """The evidence for the level; None where the caller gave it."""
+        return self.found.choice
+
+    @property
+    def missed(self) -> float:
+        """Share of the drawings' pixels of the figure whose densities were raised to the level (see outlines.py)."""
+        return self.found.missed
+
+    @property
+    def num_floaters(self) -> int:
+        """Parts dropped."""
+        return self.found.extraction.num_floaters
+
+    @property
+    def num_cavities(self) -> int:
+        """Hidden holes dropped."""
+        return self.found.extraction.num_cavities
+
+    @property
+    def num_extracted(self) -> int:
+        """Faces before decimation."""
+        return len(self.found.extraction.mesh.faces)
+
+    @property
+    def left_out(self) -> LeftOut:
+        """Grid points not evaluated."""
+        return self.found.left_out
 
 
 def build_mesh(
@@ -142,16 +165,4 @@ def finish_mesh(
         mesh = textured.mesh
     if options.height is not None:
         mesh, surface = fit_height(mesh, options.height), fit_height(surface, options.height)
-    return BuiltMesh(
-        mesh=mesh,
-        surface=surface,
-        level=extraction.level,
-        choice=found.choice,
-        missed=found.missed,
-        num_extracted=len(extraction.mesh.faces),
-        num_floaters=extraction.num_floaters,
-        num_cavities=extraction.num_cavities,
-        left_out=found.left_out,
-        textured=textured,
-        seconds=found.seconds + time.perf_counter() - start,
-    )
+    return BuiltMesh(mesh, surface, found, textured, found.seconds + time.perf_counter() - start)
