@@ -15,6 +15,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from charnerf.cli import run as charnerf
 from charnerf.errors import DataError
+from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.training.run_lock import RunLock
 from charnerf.watching.folder import WatchedFolder
 from charnerf.watching.history import History, read_history
@@ -122,6 +123,18 @@ def test_the_stages_of_a_run(tmp_path):
     assert state_of(run).stage is Stage.STOPPED, "metrics are those of before"
 
 
+def test_a_run_that_is_done_tells_all_its_steps_and_seconds(tmp_path):
+    """Its metrics know them; what TensorBoard got last is older."""
+    run = train(begin(tmp_path, steps=50))
+    figures = {**dict.fromkeys(METRIC_KEYS, 0.5), "num_characters": 1, "num_views": 1}
+    rest = {"split": "test", "by_azimuth": [], "per_character": {}, "seconds": {"train": 26.5}, "steps": 50}
+    (run / "metrics.json").write_text(json.dumps(figures | rest))
+    done = state_of(run)
+    assert (done.stage, done.steps, done.seconds, done.share) == (Stage.DONE, 50, 26.5, 1.0)
+    (run / "cell.json").write_text(json.dumps({"state": "running"}))
+    assert (state_of(run).steps, state_of(run).seconds) == (40, 20.0), "metrics are those of before"
+
+
 @pytest.mark.parametrize(
     "content", ["", "{", "[]", "budget: 3", "budget: {steps: many}", "budget: {steps: .inf}", "\x00"]
 )
@@ -221,7 +234,7 @@ def test_a_page_elsewhere_that_took_this_machines_address_gets_nothing(server, h
     assert ask(server, "/", Host=host)[0] == 403
 
 
-@pytest.mark.parametrize("host", ["localhost", "127.0.0.1:8000", "localhost:6007"])
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1:8000", "LOCALHOST:6007", "[::1]:6007"])
 def test_a_tunnel_may_have_another_port(server, host):
     assert ask(server, "/", Host=host)[0] == 200
 
@@ -238,6 +251,8 @@ def test_once_prints_states(tmp_path, capsys):
     assert charnerf(["watch", str(tmp_path / "run"), "--once", "--json", "-", "--quiet"]) == 0
     (one,) = json.loads(capsys.readouterr().out)["details"]["runs"]
     assert (one["stage"], one["steps"], one["share"]) == ("stopped before its end", 40, 0.4)
+    assert charnerf(["watch", str(tmp_path / "run"), "--once", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
 
 
 def test_a_port_that_is_taken_is_told(server, capsys):

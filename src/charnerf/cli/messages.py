@@ -8,21 +8,26 @@ import typer
 
 from charnerf.progress import reported_to
 
-_is_quiet: ContextVar[bool] = ContextVar("is_quiet", default=False)
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+def is_quiet() -> bool:
+    """Whether the user asked for warnings and errors alone."""
+    return _quiet.get()
 
 
 def say(text: str) -> None:
     """Tell the user, on standard error: standard output is for what programs read."""
-    if not _is_quiet.get() or text.startswith("warning"):
+    if not is_quiet() or text.startswith("warning"):
         typer.echo(text, err=True)
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
     """Tell nothing meanwhile but warnings; errors are told by whoever catches them."""
-    token = _is_quiet.set(True)
+    token = _quiet.set(True)
     try:
         with reported_to(lambda moment: None):
             yield
     finally:
-        _is_quiet.reset(token)
+        _quiet.reset(token)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from charnerf.cli.messages import say
+from charnerf.cli.messages import is_quiet, say
 
 JsonFile = Annotated[
     Path | None,
@@ -78,8 +78,8 @@ def close(summary: Summary, json_file: Path | None) -> None:
 
 
 def show(text: str, json_file: Path | None) -> None:
-    """Print a result where the JSON does not go."""
-    if json_file != STDOUT:
+    """Print a result for people where the JSON does not go, and nothing where they asked for quiet."""
+    if json_file != STDOUT and not is_quiet():
         typer.echo(text)
 
 

@@ -8,14 +8,12 @@ from typing import Any, final
 from urllib.parse import unquote, urlsplit
 
 from charnerf.errors import CharNeRFError
+from charnerf.hosts import host_name, is_known
 from charnerf.watching.folder import WatchedFolder
 from charnerf.watching.page import REPORT
 
 HOME = "127.0.0.1"
-NAMES = (
-    "127.0.0.1",
-    "localhost",
-)  # by which a browser here may have been sent: any other is a page elsewhere that renamed itself
+NAMES = ("localhost",)
 MOST_PAGES = 8  # kept: a whole one takes some MiB
 HTML = "text/html; charset=utf-8"
 
@@ -79,8 +77,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer."""
-        host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
-        if host not in NAMES:
+        if not is_known(host_name(self.headers.get("Host", "")), NAMES):
             self._answer(HTTPStatus.FORBIDDEN, b"This page is for the machine that it runs on.", "text/plain")
             return
         address = urlsplit(self.path)

@@ -12,11 +12,13 @@ from charnerf.config.foreign import read_yaml
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.files import is_locked, read_text
 from charnerf.progress import left_text
+from charnerf.reporting.run_files import read_metrics
 from charnerf.reporting.runs import CELL_FILE
 from charnerf.training.run_lock import LOCK_FILE
 from charnerf.watching.history import SECONDS, History
 
 MOST_RUNS = 200  # below one folder
+METRICS_FILE = "metrics.json"
 MARKS = {"config.yaml", CELL_FILE}  # a run has one of them
 
 
@@ -44,8 +46,8 @@ class State:
         name: Its path below the folder that is watched.
         stage: What it does.
         share: Of its budget that training has used up, in [0, 1]; None where that is not known.
-        steps: Done.
-        seconds: Of training.
+        steps: Done: what its metrics tell, until then what it wrote last.
+        seconds: Of training, as the steps.
         left_s: Training seconds left, None where nobody trains or it is not known.
         psnr_foreground: The newest of validation, dB.
         error: Why it failed.
@@ -97,10 +99,10 @@ def read_state(run: Path, name: str, history: History) -> State:
         name: What it is called.
         history: What it wrote.
     """
-    steps = max(history.points.get("train/loss/total", {0: 0.0}))
-    seconds = history.last(SECONDS) or 0.0
+    is_over = not is_locked(run / LOCK_FILE)
+    steps, seconds = (_measured_after(run) if is_over else None) or _newest(history)
     share = _share(run, steps, seconds)
-    stage = _stage(run, steps, share)
+    stage = _stage_at_end(run) if is_over else _stage_at_work(steps, share)
     trains = stage is Stage.TRAINS and share is not None and share > 0.0
     return State(
         name=name,
@@ -114,17 +116,40 @@ def read_state(run: Path, name: str, history: History) -> State:
     )
 
 
-def _stage(run: Path, steps: int, share: float | None) -> Stage:
-    """The lock says whether anybody works on it; the system frees that of a killed process."""
-    if is_locked(run / LOCK_FILE):
-        if (share or 0.0) >= 1.0:
-            return Stage.MEASURES
-        return Stage.TRAINS if steps else Stage.BEGUN
+def _stage_at_work(steps: int, share: float | None) -> Stage:
+    """Of a run whose lock is held; the system frees that of a killed process."""
+    if (share or 0.0) >= 1.0:
+        return Stage.MEASURES
+    return Stage.TRAINS if steps else Stage.BEGUN
+
+
+def _stage_at_end(run: Path) -> Stage:
+    """Of a run that nobody works on."""
     recorded = _cell(run).get("state")
     if recorded == "failed":
         return Stage.FAILED
-    is_done = (run / "metrics.json").is_file() and recorded in (None, "done")
-    return Stage.DONE if is_done else Stage.STOPPED
+    return Stage.DONE if _is_measured(run) else Stage.STOPPED
+
+
+def _is_measured(run: Path) -> bool:
+    """Whether it has metrics, and not those of before."""
+    return (run / METRICS_FILE).is_file() and _cell(run).get("state") in (None, "done")
+
+
+def _measured_after(run: Path) -> tuple[int, float] | None:
+    """Steps and training seconds that its metrics tell; None where there are none yet, or they do not."""
+    if not _is_measured(run):
+        return None
+    try:
+        metrics = read_metrics(run / METRICS_FILE)
+        return int(metrics["steps"]), float(metrics["seconds"]["train"])
+    except (CharNeRFError, KeyError, TypeError, ValueError):
+        return None
+
+
+def _newest(history: History) -> tuple[int, float]:
+    """Steps and training seconds of what was written last."""
+    return max(history.points.get("train/loss/total", {0: 0.0})), history.last(SECONDS) or 0.0
 
 
 def _share(run: Path, steps: int, seconds: float) -> float | None:
