@@ -3,7 +3,6 @@
 import time
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -253,10 +252,7 @@ def _capture_items(
     outcomes: dict[_Item, _Outcome] = {}
     began = time.perf_counter()
     try:
-        with (
-            Progress("capture") as progress,
-            closing(in_processes(work, items, processes)) as results,
-        ):
+        with Progress("capture") as progress, in_processes(work, items, processes) as results:
             for item, outcome in results:
                 for note in outcome.notes:
                     progress.say(f"{item.name}: {note}")

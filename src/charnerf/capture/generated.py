@@ -161,9 +161,9 @@ def _make_missing(
     missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
     if not missing:
         return
-    with Progress("generate") as progress:
+    with Progress("generate") as progress, in_processes(make, missing, processes) as made:
         step = progress.counter(len(missing))
-        for (split, index), _ in in_processes(make, missing, processes):
+        for (split, index), _ in made:
             add_to_split(root, split, [_name(split, index)])
             step()
 

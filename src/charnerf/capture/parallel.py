@@ -4,9 +4,10 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from typing import TypeVar
@@ -20,10 +21,13 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+@contextmanager
 def in_processes(
     work: Callable[[Item], Result], items: Sequence[Item], processes: int | None
-) -> Generator[tuple[Item, Result], None, None]:
-    """Do work on items, yielding each with its result as it ends.
+) -> Iterator[Iterator[tuple[Item, Result]]]:
+    """Do work on items while the block runs; its target yields each with its result as it ends.
+
+    A block that is left early, by an error or a signal too, begins nothing more and waits for what is at hand.
 
     Args:
         work: Function, with its arguments, that can be sent to another process.
@@ -35,22 +39,19 @@ def in_processes(
     """
     count = min(processes or os.cpu_count() or 1, len(items))
     if count <= 1:
-        for item in items:
-            yield item, work(item)
+        yield ((item, work(item)) for item in items)
         return
     with ProcessPoolExecutor(count, mp_context=_context(), initializer=_begin) as pool:
         waiting = {pool.submit(_do, work, item): item for item in items}
         try:
-            for done in as_completed(waiting):
-                yield waiting[done], done.result()
+            yield ((waiting[done], done.result()) for done in as_completed(waiting))
         except BrokenProcessPool as err:
             raise DataError(
                 "A worker process died, perhaps for want of memory; what was written is kept, "
                 "run the command again for the rest, with fewer processes."
             ) from err
-        except BaseException:
-            pool.shutdown(cancel_futures=True)  # waits for what is at hand
-            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def _do(work: Callable[[Item], Result], item: Item) -> Result:

@@ -1,6 +1,6 @@
 """A data set's characters examined, one by one: files, figures, cameras, mesh."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,7 @@ MOST_BYTES_HELD = 2**30  # of a character's pictures at once; further ones are n
 
 def dataset_findings(
     root: Path, *, processes: int | None, counter: Callable[[int], Callable[[], object]]
-) -> Iterator[Finding]:
+) -> list[Finding]:
     """What is wrong with a data set, ours or foreign.
 
     Args:
@@ -49,19 +49,20 @@ def dataset_findings(
         try:
             splits = read_dataset(root).splits
         except DataError as error:
-            yield Finding(
-                "broken list", str(root / DATASET_FILE), str(error), "a list of splits", "Write it again."
-            )
-            return
+            where = str(root / DATASET_FILE)
+            return [Finding("broken list", where, str(error), "a list of splits", "Write it again.")]
         names = list(dict.fromkeys(name for members in splits.values() for name in members))
         patients = [partial(_of_ours, root, name) for name in names]
     else:
         form, found = recognised(root)
         patients = [partial(_of_foreign, form, one) for one in found]
     examined = counter(len(patients))
-    for _, findings in in_processes(_examine, patients, processes):
-        examined()
-        yield from findings
+    told: list[Finding] = []
+    with in_processes(_examine, patients, processes) as results:
+        for _, findings in results:
+            examined()
+            told += findings
+    return told
 
 
 def _examine(admit: Callable[[], Patient]) -> list[Finding]:

@@ -81,9 +81,9 @@ def kept_copy(
         remove_partial_characters(home)
         work = partial(_keep, home=home, form=form, reading=reading)
         errors = []
-        with Progress(f"read {root.name}") as progress:
+        with Progress(f"read {root.name}") as progress, in_processes(work, found, processes) as results:
             step = progress.counter(len(found))
-            for _, error in in_processes(work, found, processes):
+            for _, error in results:
                 step()
                 errors += [error] if error else []
         if errors:

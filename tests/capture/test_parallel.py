@@ -1,0 +1,49 @@
+"""Work in parallel processes."""
+
+import multiprocessing
+import os
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from charnerf.capture.parallel import in_processes
+from charnerf.errors import DataError
+from charnerf.interruption import Stopped
+
+
+def begin(number: int, folder: Path) -> int:
+    (folder / str(number)).touch()
+    time.sleep(0.02)
+    return number
+
+
+def die(number: int) -> None:
+    os._exit(number)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_each_item_comes_with_its_result(processes: int, tmp_path: Path) -> None:
+    with in_processes(partial(begin, folder=tmp_path), range(5), processes) as results:
+        assert sorted(results) == [(number, number) for number in range(5)]
+
+
+@pytest.mark.parametrize("error", [DataError("the caller's"), Stopped(15), None])
+def test_a_block_that_is_left_early_begins_nothing_more(error: BaseException | None, tmp_path: Path) -> None:
+    """While the error is held, as a traceback holds what failed."""
+    work, caught = partial(begin, folder=tmp_path), None
+    try:
+        with in_processes(work, range(500), 2) as results:
+            next(results)
+            if error is not None:
+                raise error
+    except type(error) as err:
+        caught = err
+    assert caught is error and not multiprocessing.active_children()
+    assert 1 <= len(list(tmp_path.iterdir())) < 100
+
+
+def test_a_process_that_dies_is_told() -> None:
+    with pytest.raises(DataError, match="worker process died"), in_processes(die, [3, 4], 2) as results:
+        list(results)
