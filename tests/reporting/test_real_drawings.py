@@ -4,7 +4,7 @@ import torch
 from PIL import Image
 
 from charnerf.errors import DataError
-from charnerf.reporting.real_drawings import drawn_views, find_drawings, guessed_side
+from charnerf.reporting.real_drawings import drawn_views, find_drawings
 
 
 def draw(path, *, arm="left", alpha=True):
@@ -62,18 +62,6 @@ def test_a_missing_back_is_the_mirrored_front(tmp_path):
     torch.testing.assert_close(
         towards, torch.tensor([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), atol=1e-6, rtol=0.0
     )
-
-
-def test_a_guessed_side_is_as_deep_as_the_trunk_is_wide_and_not_as_the_arms():
-    front = np.zeros((110, 100, 4), dtype=np.float32)
-    front[5:105, 40:60] = (0.8, 0.1, 0.1, 1.0)
-    front[20:30, 5:95] = (0.1, 0.1, 0.8, 1.0)  # arms
-    side = guessed_side(front)
-    depths = side[..., 3].sum(1)
-    assert set(depths[5:20]) | set(depths[30:105]) == {14.0}  # 0.7 of 20
-    assert set(depths[20:30]) == {21.0}  # 0.7 of 0.3 of the height of 100
-    assert not depths[:5].any() and not depths[105:].any()
-    np.testing.assert_allclose(side[25, 50], (0.1, 0.1, 0.8, 1.0))
 
 
 def test_a_mask_beside_a_picture_is_its_alpha(tmp_path):

@@ -97,8 +97,9 @@ class Recognizer:
         used = in_order(figures)
         read = read_views(given_drawings(used), size=self.size, options=reading)
         folder.mkdir(parents=True)
-        agreements = read.reconciliation.views
-        shown = zip(used, read.names, agreements, _panels(read, len(used), folder), strict=True)
+        shown = zip(  # a side that was guessed beside them comes last
+            used, read.names, read.reconciliation.views, _panels(read, len(used), folder), strict=False
+        )
         views = tuple(
             RecognizedView(figure.number, name, given, mended, *agreement_words(agreement, read.names))
             for figure, name, agreement, (given, mended) in shown

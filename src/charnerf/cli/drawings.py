@@ -55,7 +55,8 @@ FigureOf = Annotated[
 AsDrawn = Annotated[
     bool,
     typer.Option(
-        "--as-drawn", help="Take views as they are drawn, also where they disagree; else they are mended."
+        "--as-drawn",
+        help="Take views as they are drawn, also where they disagree; else they are mended, and a missing side is guessed.",
     ),
 ]
 

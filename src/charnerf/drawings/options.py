@@ -18,7 +18,7 @@ class ReadingOptions:
     """What is done to drawings before the model sees them.
 
     Attributes:
-        reconciled: Whether views that disagree are mended; else they are only compared.
+        reconciled: Whether views that disagree are mended, and a missing side guessed; else they are only compared.
         keep_ink: Whether lines along outlines stay, as if they were paint.
         segment: Tells figures from what lies behind them, as `cutout.cut_out` takes it.
     """

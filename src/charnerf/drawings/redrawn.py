@@ -53,7 +53,7 @@ def redrawn(
     drawn = draw_character(character, size=SIDE, seed=seed, level=level, azimuths_deg=azimuths).values()
     drawings = turnaround(*drawn) if views is None else dict(zip(views, drawn, strict=True))
     read = read_views(drawings, size=size, options=options)
-    names = tuple(_stored_name(view) for view in drawings)
+    names = tuple("side" if name == "left" else name for name in read.names)
     return replace(character, sources=read.views, source_names=names)
 
 

@@ -14,11 +14,12 @@ from charnerf.drawings.doubts import Doubt, DoubtKind
 from charnerf.drawings.enclosed import shared
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
+from charnerf.drawings.missing_side import missing_side
 from charnerf.drawings.naming import colors_look_left
 from charnerf.drawings.options import ReadingOptions, Segment
 from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.picture import draw_assumptions
-from charnerf.drawings.viewpoints import Viewpoint, between_square_ones
+from charnerf.drawings.viewpoints import Viewpoint, between_square_ones, is_between
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
 from charnerf.geometry.framing import framing_cameras
@@ -29,6 +30,10 @@ from charnerf.types import SourceViews
 Picture = str | Path | np.ndarray
 LEAST_AGREEMENT = 0.85  # IoU of two outlines that ought to be one; below, the user is warned
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
+GUESSED = (
+    "is not drawn: it was guessed, as deep as a three-quarter view says or nearly as deep as wide. Give a drawing of it;"
+    " --as-drawn takes the others alone."
+)
 NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 
 
@@ -37,8 +42,9 @@ class Turnaround:
     """Drawings made ready for the model.
 
     Attributes:
-        views: B = 1, V in the order given: orthographic, S x S, reconciled.
-        names: What each view is: "front", "left", "back", "45 degrees".
+        views: B = 1, V in the order given: orthographic, S x S, reconciled. A guessed side stands for the three-quarter view
+            that it was guessed from, or last.
+        names: What each view is: "front", "left", "back", "45 degrees"; "left, guessed" where no side is drawn.
         detailed: The same views with as many pixels as the finest drawing has, within DETAIL; for textures.
         half_extent: Half the canvas' side, m.
         given_alphas: The views' masks before they were reconciled, (V, S, S).
@@ -72,6 +78,12 @@ class _Figure:
     drawing: Drawing
     cutout: Cutout
     box: FigureBox
+    is_guessed: bool = False
+
+    @property
+    def name(self) -> str:
+        """What the view is."""
+        return f"{self.viewpoint.name}, guessed" if self.is_guessed else self.viewpoint.name
 
 
 def read_views(
@@ -91,8 +103,7 @@ def read_views(
         raise DataError(f"size: found {size}, expected at least 16 pixels.")
     _check_viewpoints(drawings)
     options = options or ReadingOptions()
-    figures = _without_gaps([_prepare(view, source, options.segment) for view, source in drawings.items()])
-    figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
+    figures, inked = _figures(drawings, options)
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
     given = _canvases(figures, extent, size)
     agreement = reconcile(
@@ -106,7 +117,7 @@ def read_views(
     if options.reconciled:
         canvases, detailed = agreement.apply(canvases), agreement.apply(detailed)
         widened = agreement.widened_alphas(canvases)
-    names = tuple(figure.viewpoint.name for figure in figures)
+    names = tuple(figure.name for figure in figures)
     return Turnaround(
         views=_source_views(canvases, figures, extent, widened),
         detailed=_source_views(detailed, figures, extent),
@@ -124,6 +135,15 @@ def read_views(
             given, canvases, list(names), [figure.drawing.name for figure in figures], extent
         ),
     )
+
+
+def _figures(
+    drawings: Mapping[Viewpoint, Picture], options: ReadingOptions
+) -> tuple[list[_Figure], tuple[str, ...]]:
+    """The figures cut out, without ink, with a side; and what is to be said of ink."""
+    figures = _without_gaps([_prepare(view, source, options.segment) for view, source in drawings.items()])
+    figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
+    return _with_side(figures) if options.reconciled else figures, inked
 
 
 def _check_viewpoints(drawings: Mapping[Viewpoint, Picture]) -> None:
@@ -217,9 +237,23 @@ def _without_ink(figures: Sequence[_Figure]) -> tuple[list[_Figure], tuple[str, 
     )
 
 
+def _with_side(figures: Sequence[_Figure]) -> list[_Figure]:
+    """The figures with a side that is guessed where none is drawn: it stands for a three-quarter view, or last."""
+    found = missing_side({figure.viewpoint: figure.cutout.rgba for figure in figures})
+    if found is None:
+        return list(figures)
+    side, rgba = found
+    name = f"the {side.name} side"
+    drawing = Drawing(rgba, name, (rgba.shape[1], rgba.shape[0]), lossy=False)
+    guess = _Figure(side, drawing, Cutout(rgba, ()), figure_box(rgba[..., 3], name), is_guessed=True)
+    with_it = [guess if is_between(figure.viewpoint.azimuth_deg) else figure for figure in figures]
+    return with_it if guess in with_it else [*with_it, guess]
+
+
 def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
     """What was done to single drawings."""
     lines = []
+    figures = [figure for figure in figures if not figure.is_guessed]
     for figure in figures:
         width, height = figure.drawing.size
         lines.append(
@@ -257,8 +291,9 @@ def _doubts(
         )
         for one in between_square_ones([figure.viewpoint for figure in figures])
     ]
+    guessed = [Doubt(figure.drawing.name, GUESSED) for figure in figures if figure.is_guessed]
     apart = (*_disagreements(agreement, figures), *_other_designs(canvases, figures))
-    return (*small, *_turned_sides(canvases, figures), *apart, *between)
+    return (*guessed, *small, *_turned_sides(canvases, figures), *apart, *between)
 
 
 def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[Doubt]:

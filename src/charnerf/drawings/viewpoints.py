@@ -21,6 +21,10 @@ AZIMUTHS = {
 }
 """Degrees, 0 the front, 90 the character's left side, by name; three-quarter views show the left side unless they say right."""
 
+FACING, SIDEWAYS = (
+    0.1,
+    0.9,
+)  # sines of azimuths: below, from the front or back; above, from a side, which bounds the depth
 HIGHEST = 80.0  # degrees of elevation: from straight above a figure has no floor line
 
 
@@ -77,6 +81,25 @@ def between_square_ones(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint]:
     return [one for one in viewpoints if one.azimuth_deg % 90.0]
 
 
+def is_between(azimuth_deg: float) -> bool:
+    """Whether a view is neither from the front nor from the back."""
+    return _across(azimuth_deg) > FACING
+
+
+def side_missing(viewpoints: Sequence[Viewpoint]) -> Viewpoint | None:
+    """The side that bounds the depth and is not there; None where one is, or two others, or a view from above, do that too.
+
+    It is the side next to the one view between front, side and back, the left one where there is none. Without a front or a
+    back nothing is missing: there is nothing to guess from.
+    """
+    between = [one for one in viewpoints if is_between(one.azimuth_deg)]
+    if len(between) > 1 or len(between) == len(viewpoints) or any(one.elevation_deg for one in viewpoints):
+        return None
+    if any(_across(one.azimuth_deg) > SIDEWAYS for one in viewpoints):
+        return None
+    return viewpoint("right" if between and between[0].azimuth_deg > 180.0 else "left")
+
+
 def viewpoint(text: str | float) -> Viewpoint:
     """Read a name such as `left`, an azimuth such as 45, or azimuth and elevation such as `45,20`.
 
@@ -114,3 +137,8 @@ def turnaround(front: Drawn, side: Drawn, back: Drawn, *, side_is: str = "left")
             f"side: found '{side_is}', expected 'left' or 'right': which side of the character is drawn."
         )
     return {viewpoint("front"): front, viewpoint(side_is): side, viewpoint("back"): back}
+
+
+def _across(azimuth_deg: float) -> float:
+    """How far from the side a viewer stands: 0 before or behind the figure, 1 beside it."""
+    return abs(math.sin(math.radians(azimuth_deg)))

@@ -16,6 +16,7 @@ from PIL import Image
 from charnerf.drawings.align import figure_box, half_extent, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array, load_drawing
+from charnerf.drawings.missing_side import guessed_side
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.geometry.framing import SOURCE_ORDER, source_cameras
 from charnerf.inference.model import Model
@@ -27,10 +28,6 @@ from charnerf.reporting.rows import Row
 from charnerf.types import SourceViews
 
 SHOWN = (30.0, 150.0)  # azimuths rendered
-ROUNDNESS, THICKEST = (
-    0.7,
-    0.3,
-)  # of a guessed side: depth over width, and the width of a trunk over the height
 PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 _MASK, _TEXTURE = "_mask", "_texture"
 
@@ -92,7 +89,7 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
     if "back" not in cut:
         cut["back"] = cut["front"][:, ::-1].copy()
     if "side" not in cut:
-        cut["side"] = guessed_side(cut["front"])
+        cut["side"] = guessed_side({0.0: cut["front"]}, 90.0)
     boxes = [figure_box(cut[view][..., 3], f"{character.name}, {view}") for view in SOURCE_ORDER]
     extent = half_extent([(cut[view][..., 3], box) for view, box in zip(SOURCE_ORDER, boxes, strict=True)])
     canvases = [
@@ -106,25 +103,6 @@ def drawn_views(character: DrawnCharacter, size: int) -> tuple[SourceViews, str]
         mirrored=flags.clone(),
     )
     return views, assumed
-
-
-def guessed_side(front: np.ndarray) -> np.ndarray:
-    """A side view for a front without one, floats (H, W, 4): in every row as deep as ROUNDNESS of its widest part is wide.
-
-    Parts that reach out, such as arms, are taken to be no deeper than a trunk may be. The colour is the row's median.
-    """
-    side = np.zeros_like(front)
-    seen = front[..., 3] > 0.5
-    most = THICKEST * int(seen.any(1).sum())
-    centre = 0.5 * front.shape[1]
-    for row in np.flatnonzero(seen.any(1)):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], seen[row], [False])).astype(np.int8)))
-        widest = float((edges[1::2] - edges[::2]).max())
-        reach = max(0.5, 0.5 * ROUNDNESS * min(widest, most))
-        columns = slice(max(0, int(centre - reach + 0.5)), int(centre + reach + 0.5))
-        side[row, columns, :3] = np.median(front[row, seen[row], :3], axis=0)
-        side[row, columns, 3] = 1.0
-    return side
 
 
 def real_drawings(
