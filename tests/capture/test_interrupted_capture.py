@@ -97,11 +97,12 @@ def test_a_mesh_that_has_changed_is_another_capture(boxes, tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)]
+    ("number", "status"),
+    [(signal.SIGTERM, 143), pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow), (signal.SIGKILL, -9)],
 )
 def test_the_command_stops_with_its_workers_and_goes_on(boxes, tmp_path, number, status):
     root = tmp_path / "set"
-    for copy in range(40):
+    for copy in range(20):
         shutil.copy(boxes[0], tmp_path / f"in/box{copy:02d}.obj")
     command = [sys.executable, "-m", "charnerf", "capture", str(tmp_path / "in"), "-o", str(root)]
     command += ["--size", "32", "--views", "12", "--jobs", "2"]
@@ -121,9 +122,9 @@ def test_the_command_stops_with_its_workers_and_goes_on(boxes, tmp_path, number,
     if number != signal.SIGKILL:
         assert there == set(read_dataset(root).splits["train"])
     there = {name for name in there if not name.startswith(".")}
-    assert 1 <= len(there) < 44
+    assert 1 <= len(there) < 24
     again = subprocess.run(command, capture_output=True, check=False)
     assert again.returncode == 0, again.stderr.decode()
     assert f"{counted(len(there), 'character')} skipped: there from the same capture".encode() in again.stderr
-    assert len(read_dataset(root).splits["train"]) == 44
+    assert len(read_dataset(root).splits["train"]) == 24
     assert not [path for path in root.iterdir() if path.name.startswith(".")]

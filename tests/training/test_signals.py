@@ -128,7 +128,9 @@ def is_alive(process: int) -> bool:
     return file.is_file() and file.read_text().rpartition(")")[2].split()[0] != "Z"
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, 143), pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow)]
+)
 def test_the_command_ends_with_its_status_and_its_workers(figure_dataset, tmp_path, number, status):
     """The whole group of processes gets the signal, as from a terminal or a queue."""
     long = ("scale.steps=100000", "validation.times=20000", "batches.workers=1")
