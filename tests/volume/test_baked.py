@@ -13,9 +13,9 @@ from charnerf.scene import FunctionField, Scene
 from charnerf.types import FieldOutput, RayBundle, Rendering
 from charnerf.volume.baking.bake import Baked, bake
 from charnerf.volume.baking.field import BakedField
-from charnerf.volume.baking.march import Seen
+from charnerf.volume.baking.march import _Groups
 from charnerf.volume.quadrature import PiecewiseConstant
-from charnerf.volume.renderers.baked import BakedRenderer
+from charnerf.volume.renderers.baked import BakedRenderer, largest_beyond
 from charnerf.volume.renderers.culled import CulledRenderer
 from support import helpers, tiny_models
 
@@ -182,13 +182,26 @@ def test_what_can_not_be_baked_is_rendered_as_culled(caplog):
     assert baked().render(prepared, rays).estimate is None  # gradients are kept here: as in training
 
 
-def test_of_distrusted_rays_only_what_matters_is_asked():
-    """Ray 0 has one large error and two small ones, ray 1 two that are allowed together, ray 2 none."""
-    allowed = (0.4 * 0.05) ** 2
-    squares = allowed * torch.tensor((2.0, 0.3, 0.3, 0.45, 0.45))
-    nothing, ray = torch.zeros(3), torch.tensor((0, 0, 0, 1, 1))
-    seen = Seen(ray, torch.ones(5), torch.ones(5), nothing, nothing, nothing, 5)
-    assert baked()._distrusted(seen, squares).tolist() == [0]
+def test_of_rays_in_doubt_the_fewest_places_are_asked():
+    """Ray 0 is within what is allowed without its largest error, ray 1 as it is, ray 2 not without its two largest."""
+    rows = torch.tensor((2, 0, 1, 0, 2, 1, 0, 2))
+    errors = torch.tensor((0.5, 2.0, 0.45, 0.3, 3.0, 0.45, 0.3, 0.7))
+    assert sorted(largest_beyond(rows, errors, 4, 1.0).tolist()) == [1, 4, 7]
+    assert largest_beyond(rows, errors, 4, 10.0).tolist() == []
+
+
+def test_light_of_one_colour_is_that_of_its_heaviest_place():
+    """A ray's light in quarters: what comes to the first takes little, much and little again; the rest has a colour of its own."""
+    rays = torch.tensor((1, 1, 1, 1))
+    weights = torch.tensor((0.05, 0.6, 0.1, 0.2))
+    before = torch.tensor((1.0, 0.95, 0.35, 0.25))
+    groups = _Groups(rays, torch.tensor((1.0, 2.0, 3.0, 4.0)), weights, before)
+    found = groups.by_light(2, 0.25)
+    assert found.t_vals.tolist() == [2.0, 3.0, 4.0] and found.rays.tolist() == [1, 1, 1]
+    assert torch.allclose(found.weights, torch.tensor((0.65, 0.1, 0.2)))
+    equal = replace(groups, weights=torch.full((4,), 0.2), before=torch.full((4,), 0.9)).by_light(2, 0.25)
+    assert torch.allclose(equal.weights, torch.full((4,), 0.2))  # of equal ones all stay
+    assert groups.by_light(2, 1e-3) is groups
 
 
 def test_a_grid_that_does_not_fit_is_coarser_and_says_so(caplog):

@@ -1,8 +1,9 @@
 """Rays through a baked grid: empty space is stepped over, and nothing is looked at behind opaque surface.
 
-Letters: R rays, r those under way, S samples at once, P groups of samples that count.
+Letters: R rays, r those under way, S samples at once, N groups of samples, P places that have a colour of their own.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import torch
@@ -12,11 +13,12 @@ from charnerf.geometry.rays import box_interval
 from charnerf.types import RayBundle, TensorRecord
 from charnerf.volume.baking.grid import BakedGrid
 
-AT_ONCE = 3  # samples of a ray between two looks at how much light is left; they share a colour, in the middle of their light
+AT_ONCE = 3  # samples of a ray between two looks at how much light is left: a group
 SPACING = 1.5  # steps of the fine grid between samples
 FAINT_SHARE = (
     0.2  # of the light that is followed no further: groups that take less have no colour of their own
 )
+MOST_SHARES = 64  # of a ray's light; where colours are to be finer than that each group has its own
 BORDER = 1e-5  # m that a ray goes on beyond the border of a cell, so that rounding does not hold it there
 
 
@@ -25,9 +27,10 @@ class Seen:
     """What rays (R,) meet in a grid.
 
     Attributes:
-        rows: The rays of the groups that count, (P,).
-        t_vals: Where these lie, in the middle of their light, (P,), m.
+        rows: The rays of the places that have colours, (P,).
+        t_vals: Where these lie, (P,), m.
         weights: Their shares of their ray's light, (P,).
+        moments: Sums of distances by shares of light, (R,), m.
         passed: Light that is left, (R,).
         far: Where they leave the grid, (R,), m.
         errors: Of the rays' opacity, estimated, (R,).
@@ -37,6 +40,7 @@ class Seen:
     rows: Tensor
     t_vals: Tensor
     weights: Tensor
+    moments: Tensor
     passed: Tensor
     far: Tensor
     errors: Tensor
@@ -58,13 +62,45 @@ class _UnderWay(TensorRecord):
         return torch.addcmul(self.origins[:, None], self.directions[:, None], t_vals[..., None])
 
 
-def march(grid: BakedGrid, rays: RayBundle, *, unseen: float) -> Seen:
+@dataclass(frozen=True)
+class _Groups(TensorRecord):
+    """Groups of samples (N,): their rays, the middles of their light, m, their shares of it, and the light that comes to them."""
+
+    rays: Tensor
+    t_vals: Tensor
+    weights: Tensor
+    before: Tensor
+
+    @classmethod
+    def of(cls, rays: Tensor, samples: Tensor, weights: Tensor, before: Tensor, least: float) -> "_Groups":
+        """Those of samples (r, S) of rays (r,) that take enough light."""
+        total = weights.sum(-1)
+        middles = (weights * samples).sum(-1) / total
+        return cls(rays, middles, total, before).rows((total > least).nonzero()[:, 0])
+
+    def by_light(self, num_rays: int, same_color: float) -> "_Groups":
+        """Of those that light comes to within the same share of a ray's light the heaviest, for all of them."""
+        if same_color * MOST_SHARES < 1.0:
+            return self
+        shares = math.ceil(1.0 / same_color)
+        key = self.rays * shares + ((1.0 - self.before) * shares).long().clamp_(0, shares - 1)
+        total = self.weights.new_zeros(num_rays * shares)
+        heaviest = total.scatter_reduce(0, key, self.weights, "amax")
+        chosen = (self.weights == heaviest.index_select(0, key)).nonzero()[:, 0]
+        key_of = key.index_select(0, chosen)
+        equal = torch.zeros_like(total).index_add_(0, key_of, torch.ones_like(chosen, dtype=total.dtype))
+        weights = (total.index_add_(0, key, self.weights) / equal.clamp_min_(1.0)).index_select(0, key_of)
+        return replace(self.rows(chosen), weights=weights)
+
+
+def march(grid: BakedGrid, rays: RayBundle, *, unseen: float, same_color: float = 0.0) -> Seen:
     """Follow rays (R,) through a grid.
 
     Args:
         grid: The grid.
         rays: Rays (R,).
         unseen: Light that is followed no further; groups that take less than a fifth of it do not count.
+        same_color: Share of a ray's light that has one colour: that of the place that takes most of it.
     """
     near, far = box_interval(rays, grid.low, grid.high)
     light, errors, spacing = torch.ones_like(near), torch.zeros_like(near), SPACING * grid.step
@@ -77,7 +113,7 @@ def march(grid: BakedGrid, rays: RayBundle, *, unseen: float) -> Seen:
         far[numbers],
     )
     offsets = (torch.arange(AT_ONCE, dtype=near.dtype, device=near.device) + 0.5) * spacing
-    groups: list[tuple[Tensor, Tensor, Tensor]] = [(numbers[:0], near[:0], near[:0])]
+    groups = [_Groups(numbers[:0], near[:0], near[:0], near[:0])]
     num_samples = 0
     while len(way.numbers):
         gap, free = _free_way(grid, way)
@@ -93,21 +129,15 @@ def march(grid: BakedGrid, rays: RayBundle, *, unseen: float) -> Seen:
             weights = torch.cat((before, after[:, :-1]), dim=-1) - after
             light.index_copy_(0, here.numbers, after[:, -1])
             errors.index_add_(0, here.numbers, (after * off).square().sum(-1))
-            groups.append(_group(here.numbers, samples, weights, FAINT_SHARE * unseen))
+            groups.append(_Groups.of(here.numbers, samples, weights, before[:, 0], FAINT_SHARE * unseen))
             t_vals.index_copy_(0, holding, here.t_vals + AT_ONCE * spacing)
             num_samples += samples.numel()
         on = ((t_vals < way.ends) & (light.index_select(0, way.numbers) > unseen)).nonzero()[:, 0]
         way = replace(way, t_vals=t_vals).rows(on)
-    found = [torch.cat(parts) for parts in zip(*groups, strict=True)]
-    return Seen(found[0], found[1], found[2], light, far, errors.sqrt(), num_samples)
-
-
-def _group(numbers: Tensor, samples: Tensor, weights: Tensor, least: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Rays, middles, m, and weights (P,) of groups of samples (r, S) that take enough light."""
-    total = weights.sum(-1)
-    chosen = (total > least).nonzero()[:, 0]
-    total, middles = total.index_select(0, chosen), (weights * samples).sum(-1).index_select(0, chosen)
-    return numbers.index_select(0, chosen), middles / total, total
+    found = _Groups.joined(groups)
+    moments = torch.zeros_like(light).index_add_(0, found.rays, found.weights * found.t_vals)
+    places = found.by_light(len(light), same_color)
+    return Seen(places.rays, places.t_vals, places.weights, moments, light, far, errors.sqrt(), num_samples)
 
 
 def _free_way(grid: BakedGrid, way: _UnderWay) -> tuple[Tensor, Tensor]:

@@ -1,6 +1,6 @@
 """Looks at a character that was evaluated once on a grid, by a tolerance, and says what error it made.
 
-Letters: R rays, P groups of samples that have one colour.
+Letters: R rays, P places on them that have colours of their own.
 """
 
 import logging
@@ -21,9 +21,8 @@ from charnerf.volume.renderers.culled import CulledRenderer
 
 log = logging.getLogger(__name__)
 
-EXACT_SHARE = (
-    0.4  # of the tolerance: estimated error of a ray's colours from which the field is asked for them
-)
+EXACT_SHARE = 0.6  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
+SAME_COLOR_SHARE = 0.8  # of the tolerance: share of a ray's light that has one colour
 TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
 
 
@@ -90,12 +89,17 @@ class BakedRenderer(AbstractRenderer):
         if not isinstance(field, BakedField) or generator is not None or torch.is_grad_enabled():
             return self._culled.render(scene, rays, generator)
         with torch.inference_mode():
-            seen = march(field.grid, rays, unseen=UNSEEN_SHARE * self.tolerance)
+            seen = march(
+                field.grid,
+                rays,
+                unseen=UNSEEN_SHARE * self.tolerance,
+                same_color=SAME_COLOR_SHARE * self.tolerance,
+            )
         return self._colored(field, rays, seen)
 
     def _colored(self, field: BakedField, rays: RayBundle, seen: Seen) -> Rendering:
         """Give what rays (R,) see its colours."""
-        num_rays, unseen = len(seen.passed), UNSEEN_SHARE * self.tolerance
+        num_rays, unseen, num_asked = len(seen.passed), UNSEEN_SHARE * self.tolerance, 0
         from_ = rays.rows(seen.rows)
         along, points = from_.directions, torch.addcmul(from_.origins, from_.directions, seen.t_vals[:, None])
         rgb, errors = field.colors_at(points, along)
@@ -103,27 +107,25 @@ class BakedRenderer(AbstractRenderer):
         counted = _by_ray(seen, seen.weights)
         # what was too little to count, or behind all light, has the colour of the rest
         share = seen.weights * (opacity / counted.clamp_min(1e-6)).index_select(0, seen.rows)
-        squares = (share * errors).square()
-        asked = self._distrusted(seen, squares)
+        errors = share * errors
         if field.source is not None:
+            asked = largest_beyond(seen.rows, errors, num_rays, EXACT_SHARE * self.tolerance)
             rgb[asked] = field.exact_colors(points[asked], along[asked])
-            squares[asked] = 0.0
-        off = _by_ray(seen, squares).sqrt()
-        uncounted = torch.where(counted > 0.0, 0.0, opacity)
-        estimated = (off.square() + seen.errors.square()).sqrt() + uncounted
-        moment = _by_ray(seen, seen.weights * seen.t_vals)
-        total = max(len(asked), num_rays * self.num_coarse)
+            errors[asked] = 0.0
+            num_asked = len(asked)
+        estimated = _by_ray(seen, errors) + seen.errors + torch.where(counted > 0.0, 0.0, opacity)
+        total = max(num_asked, num_rays * self.num_coarse)
         return Rendering(
             finest=RenderOutput(
                 rgb=_by_ray(seen, share[:, None] * rgb) + (1.0 - _by_ray(seen, share))[:, None] * WHITE,
                 opacity=opacity,
-                depth=torch.where(counted > 0.0, moment / counted.clamp_min(1e-6), seen.far),
+                depth=torch.where(counted > 0.0, seen.moments / counted.clamp_min(1e-6), seen.far),
             ),
             coarse=None,
             left_out=LeftOut(
                 rays=num_rays - int(counted.count_nonzero()),
                 rays_of=num_rays,
-                samples=total - len(asked),
+                samples=total - num_asked,
                 samples_of=total,
             ),
             estimate=ErrorEstimate(
@@ -136,16 +138,29 @@ class BakedRenderer(AbstractRenderer):
             ),
         )
 
-    def _distrusted(self, seen: Seen, squares: Tensor) -> Tensor:
-        """Groups by number that the field is asked for, so that the rest of a ray's errors (P,), squared, is small enough.
 
-        Of the rays whose error is too large those that have more of it than what is allowed leaves to each: all others together
-        stay within that.
-        """
-        allowed = (EXACT_SHARE * self.tolerance) ** 2
-        each = allowed / _by_ray(seen, torch.ones_like(squares))
-        too_large = (_by_ray(seen, squares) > allowed).index_select(0, seen.rows)
-        return (too_large & (squares > each.index_select(0, seen.rows))).nonzero()[:, 0]
+def largest_beyond(rows: Tensor, errors: Tensor, num_rays: int, allowed: float) -> Tensor:
+    """The fewest places by number without which the errors of no ray are more than allowed: the largest of its own.
+
+    Errors along a ray are taken to have one sign: what is misread at a place mostly is at the next one.
+
+    Args:
+        rows: Rays of the places, (P,).
+        errors: Of their rays' colours, (P,).
+        num_rays: R.
+        allowed: Sum of a ray's errors.
+    """
+    total = errors.new_zeros(num_rays).index_add_(0, rows, errors)
+    doubtful = (total > allowed).index_select(0, rows).nonzero()[:, 0]
+    if not len(doubtful):
+        return doubtful
+    order = doubtful[errors[doubtful].argsort(descending=True)]
+    order = order[rows[order].argsort(stable=True)]  # ray after ray, the largest error first
+    of_ray, own = rows[order], errors[order].double()
+    before = own.cumsum(0) - own
+    first = torch.cat((torch.ones_like(of_ray[:1]), of_ray.diff())) != 0
+    before -= before[first][first.cumsum(0) - 1]  # within the ray
+    return order[total[of_ray] - before > allowed]
 
 
 def _by_ray(seen: Seen, values: Tensor) -> Tensor:
