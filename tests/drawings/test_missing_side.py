@@ -120,3 +120,11 @@ def test_nothing_is_guessed_beside_a_side():
         )
         is None
     )
+
+
+def test_a_three_quarter_view_given_as_the_side_is_noticed():
+    views = {viewpoint("front"): painted("front"), viewpoint("right"): painted("front", 220)}
+    doubts = [str(one) for one in read_views(views, size=64).doubts]
+    assert any("nearly the front's" in one and "--view 315=FILE" in one for one in doubts)
+    views[viewpoint("right")] = painted("side")[:, ::-1].copy()
+    assert not any("nearly the front's" in str(one) for one in read_views(views, size=64).doubts)

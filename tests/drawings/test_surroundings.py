@@ -7,7 +7,9 @@ from PIL import Image, ImageCms, ImageDraw, ImageFilter
 from charnerf.drawings.background import find_checkerboard
 from charnerf.drawings.cutout import Cutout, cut_out
 from charnerf.drawings.load import load_drawing
-from charnerf.drawings.surroundings import count_figures
+from charnerf.drawings.surroundings import count_figures, cut_edges
+from charnerf.drawings.turnaround import read_views
+from charnerf.drawings.viewpoints import viewpoint
 from charnerf.errors import DataError
 from charnerf.reconciling.agreement import iou
 
@@ -210,3 +212,28 @@ def test_a_figure_with_a_staff_is_one_figure():
     assert count_figures(mask) == 1
     mask[10:90, 80:98] = True
     assert count_figures(mask) == 2
+
+
+@pytest.mark.parametrize(
+    ("window", "edges"),
+    [
+        ((slice(0, 60), slice(0, 60)), []),
+        ((slice(10, 51), slice(10, 51)), []),  # tight: the outline's translucent pixels lie on all four edges
+        ((slice(10, 40), slice(10, 51)), ["lower"]),
+        ((slice(20, 51), slice(10, 35)), ["upper", "right"]),
+    ],
+)
+def test_a_cut_is_opaque_where_a_tight_crop_is_not(window, edges):
+    rows, columns = np.mgrid[:60, :60]
+    disc = np.clip(20.4 - np.hypot(rows - 30, columns - 30), 0.0, 1.0)
+    assert cut_edges(disc[window]) == edges
+    assert cut_edges((disc[window] > 0.5).astype(float)) == [], "hard outlines say nothing"
+
+
+def test_a_figure_that_is_cut_off_is_asked_about():
+    rows, columns = np.mgrid[:200, :100]
+    figure = np.full((200, 100, 4), 0.4)
+    figure[..., 3] = np.clip(80.4 - np.hypot(rows - 100, (columns - 50) * 2.0), 0.0, 1.0)
+    cut = {viewpoint("front"): figure, viewpoint("left"): figure[:150]}
+    doubts = [str(one) for one in read_views(cut, size=32).doubts if "cut off" in str(one)]
+    assert len(doubts) == 1 and doubts[0].startswith("the left drawing") and "lower edge" in doubts[0]

@@ -12,13 +12,14 @@ from PIL import Image
 from charnerf.app.answers import Found, Recognized, RecognizedView
 from charnerf.app.figures import Figure, in_order, view_by_name, view_text
 from charnerf.drawings.cutout import cut_out
+from charnerf.drawings.find_doubts import LEAST_AGREEMENT
 from charnerf.drawings.load import Drawing, load_drawing
 from charnerf.drawings.naming import MOST_NAMED, name_views
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.picture import CAPTION, PANEL
 from charnerf.drawings.read_sheet import canvases_to_name, named_view, square_views
 from charnerf.drawings.sheet import Sheet, find_figures
-from charnerf.drawings.turnaround import LEAST_AGREEMENT, Picture, Turnaround, read_views
+from charnerf.drawings.turnaround import Picture, Turnaround, read_views
 from charnerf.drawings.viewpoints import Viewpoint, viewpoint
 from charnerf.errors import DataError
 from charnerf.inference.model import Model

@@ -11,6 +11,8 @@ _SAID = (  # what a command line says, and what the page does
     (r"--symmetric,", "Symmetric,"),
     (r"--smooth 10 evens", "Smoothing (10) evens"),
     (r"--view back=FILE, or right=FILE for the other side:", "A drawing of the back, or of the other side:"),
+    (r"; --as-drawn takes the others alone", "; “As drawn” takes the others alone"),
+    (r"say --view (\d+)=FILE in its place, or of a sheet --figure \d+=N: a side", r"call it \1 degrees: a side"),
     (r" \(--keep-ink leaves them\)", " (“Keep ink” leaves them)"),
     (r" \(docs/\w+\.md\)", ""),
     (r": crop it to the views of one character, or give them one by one with --view\.", ": crop it to the views of one character."),

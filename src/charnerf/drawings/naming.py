@@ -24,6 +24,10 @@ TURNS = {  # views of a sheet by how many there are, in the order in which a fig
 }
 MOST_NAMED = max(TURNS)
 DOUBTFUL = 0.08  # lead of the best naming over the next one below which the user is asked to look
+LIKE_FRONT, LIKE_WIDTHS = (
+    0.65,
+    0.8,
+)  # IoU with the front, correlation of rows' widths: beyond both, no side view was found
 LAYOUT_WEIGHT = 0.1
 FIRST_WEIGHT = 0.25  # of a front that stands before the back
 HALVES_WEIGHT = 4.0
@@ -103,6 +107,19 @@ def colors_look_left(side: np.ndarray, front: np.ndarray, back: np.ndarray) -> b
     """Whether a profile looks to the picture's left by the colours of front and back alone; None where they do not say clearly."""
     halves = _halves(front, back, side)
     return None if abs(halves) < CLEAR_HALVES else halves > 0.0
+
+
+def outline_of_front(side: np.ndarray, front: np.ndarray) -> float | None:
+    """IoU of what is called a side (S, S, 4) with the front's outline, where they are alike, as a three-quarter one is; else None.
+
+    How often that is wrong: docs/drawings.md.
+    """
+    overlap = max(iou(side[..., 3], one[..., 3]) for one in (front, front[:, ::-1]))
+    widths = np.stack([_spans(canvas[..., 3] > 0.5) for canvas in (side, front)])
+    widths = widths[:, (widths > 0).all(axis=0)]
+    if overlap < LIKE_FRONT or widths.shape[1] < 2 or not widths.std(axis=1).all():
+        return None
+    return overlap if np.corrcoef(widths)[0, 1] >= LIKE_WIDTHS else None
 
 
 def _turn(side: np.ndarray, front: np.ndarray | None, back: np.ndarray | None, looks: "_Looks") -> float:
@@ -217,6 +234,12 @@ def _detail(canvas: np.ndarray) -> np.ndarray:
     """How much colours change from pixel to pixel, (S, S)."""
     lab = rgb2lab(canvas[..., :3])
     return np.sqrt(sum(ndimage.gaussian_gradient_magnitude(lab[..., c], 1.0) ** 2 for c in range(3)))
+
+
+def _spans(figure: np.ndarray) -> np.ndarray:
+    """Columns from the first to the last pixel of each row of a figure (S, S) bool, (S,); 0 where there is none."""
+    side = figure.shape[1]
+    return np.where(figure.any(axis=1), side - figure.argmax(axis=1) - figure[:, ::-1].argmax(axis=1), 0)
 
 
 def _middle(mask: np.ndarray, columns: np.ndarray) -> float:

@@ -23,6 +23,12 @@ DARKENED = (0.25, 0.985)  # brightness of a shadow, by the paper's
 HUE = 5.0  # CIELAB distance of a shadow's hue from the paper's, darkened alike
 OPAQUE = 0.93  # alpha from which a pixel is paint
 SHADOW_TONE = (45.0, 12.0)  # CIELAB: lightest and most colourful that a shadow saved by its alpha is
+CUT_OPAQUE, CUT_SHARE = (
+    0.98,
+    0.6,
+)  # alpha, and the share of a contact with the border that has it, of a figure that is cut off
+CUT_WIDTH = 0.01  # of the figure's height: shorter contacts say nothing
+SOFT = 0.3  # translucent pixels per pixel of outline of a figure that was saved with a soft one
 ALIKE_HEIGHT, ALIKE_WIDTH = 0.7, 0.3  # shares of the largest part's that another whole figure has
 
 
@@ -111,6 +117,29 @@ def _on_the_ground(candidates: np.ndarray, figure: np.ndarray) -> np.ndarray:
         if end - start >= FLATNESS * (down - up) and beside >= BEYOND * height:
             shadow |= labels == part.label
     return shadow
+
+
+def cut_edges(alpha: np.ndarray) -> list[str]:
+    """Edges of a picture (H, W) that cut its figure off.
+
+    The soft outline of a whole figure, cropped ever so tightly, is translucent there; a cut through it is opaque. None where
+    outlines are hard, as in pixel art: those say nothing.
+    """
+    figure = alpha > 0.5
+    rows = np.flatnonzero(figure.any(axis=1))
+    outline = figure & ~ndimage.binary_erosion(figure, border_value=1)
+    soft = ndimage.binary_dilation(outline) & (alpha > 1.0 - CUT_OPAQUE) & (alpha < CUT_OPAQUE)
+    if soft.sum() <= SOFT * outline.sum():
+        return []
+    least = CUT_WIDTH * (rows[-1] + 1 - rows[0])
+    borders = {"upper": alpha[0], "lower": alpha[-1], "left": alpha[:, 0], "right": alpha[:, -1]}
+    found = []
+    for name, line in borders.items():
+        contacts, count = ndimage.label(line > 0.5)
+        runs = [line[contacts == number] for number in range(1, count + 1)]
+        if any(len(run) >= least and (run > CUT_OPAQUE).mean() >= CUT_SHARE for run in runs):
+            found.append(name)
+    return found
 
 
 def count_figures(figure: np.ndarray) -> int:

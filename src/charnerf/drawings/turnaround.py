@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from charnerf.drawings.align import FigureBox, figure_box, half_extent, place
+from charnerf.drawings.align import figure_box, half_extent, place
 from charnerf.drawings.cutout import Cutout, cut_out, see_through
-from charnerf.drawings.doubts import Doubt, DoubtKind
+from charnerf.drawings.doubts import Doubt
+from charnerf.drawings.drawn_figure import DrawnFigure
 from charnerf.drawings.enclosed import shared
+from charnerf.drawings.find_doubts import find_doubts
 from charnerf.drawings.ink import INKED, find_outline_ink, painted_over
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.missing_side import missing_side
-from charnerf.drawings.naming import colors_look_left
 from charnerf.drawings.options import ReadingOptions, Segment
-from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.picture import draw_assumptions
-from charnerf.drawings.viewpoints import Viewpoint, between_square_ones, is_between
+from charnerf.drawings.viewpoints import Viewpoint, is_between
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
 from charnerf.geometry.framing import framing_cameras
@@ -28,12 +28,7 @@ from charnerf.reconciling import Reconciliation, reconcile
 from charnerf.types import SourceViews
 
 Picture = str | Path | np.ndarray
-LEAST_AGREEMENT = 0.85  # IoU of two outlines that ought to be one; below, the user is warned
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
-GUESSED = (
-    "is not drawn: it was guessed, as deep as a three-quarter view says or nearly as deep as wide. Give a drawing of it;"
-    " --as-drawn takes the others alone."
-)
 NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 
 
@@ -68,22 +63,6 @@ class Turnaround:
     def warnings(self) -> tuple[str, ...]:
         """What looks wrong, plain sentences."""
         return tuple(map(str, self.doubts))
-
-
-@dataclass(frozen=True)
-class _Figure:
-    """One figure on its way."""
-
-    viewpoint: Viewpoint
-    drawing: Drawing
-    cutout: Cutout
-    box: FigureBox
-    is_guessed: bool = False
-
-    @property
-    def name(self) -> str:
-        """What the view is."""
-        return f"{self.viewpoint.name}, guessed" if self.is_guessed else self.viewpoint.name
 
 
 def read_views(
@@ -130,7 +109,7 @@ def read_views(
             *inked,
             *_mended(agreement, names, options.reconciled),
         ),
-        doubts=_doubts(figures, given, extent, agreement),
+        doubts=find_doubts(figures, given, extent, agreement),
         picture=draw_assumptions(
             given, canvases, list(names), [figure.drawing.name for figure in figures], extent
         ),
@@ -139,7 +118,7 @@ def read_views(
 
 def _figures(
     drawings: Mapping[Viewpoint, Picture], options: ReadingOptions
-) -> tuple[list[_Figure], tuple[str, ...]]:
+) -> tuple[list[DrawnFigure], tuple[str, ...]]:
     """The figures cut out, without ink, with a side; and what is to be said of ink."""
     figures = _without_gaps([_prepare(view, source, options.segment) for view, source in drawings.items()])
     figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
@@ -165,14 +144,14 @@ def _check_viewpoints(drawings: Mapping[Viewpoint, Picture]) -> None:
             raise DataError(f"{file}: given for two views, expected another drawing for each.")
 
 
-def _canvases(figures: Sequence[_Figure], extent: float, size: int) -> list[np.ndarray]:
+def _canvases(figures: Sequence[DrawnFigure], extent: float, size: int) -> list[np.ndarray]:
     """The figures on canvases (S, S, 4) of a size."""
     return [place(figure.cutout.rgba, figure.box, extent=extent, size=size) for figure in figures]
 
 
 def _source_views(
     canvases: Sequence[np.ndarray],
-    figures: Sequence[_Figure],
+    figures: Sequence[DrawnFigure],
     extent: float,
     widened: np.ndarray | None = None,
 ) -> SourceViews:
@@ -193,17 +172,17 @@ def _source_views(
     )
 
 
-def _prepare(viewpoint: Viewpoint, source: Picture, segment: Segment | None) -> _Figure:
+def _prepare(viewpoint: Viewpoint, source: Picture, segment: Segment | None) -> DrawnFigure:
     """Read and cut out one drawing."""
     if isinstance(source, np.ndarray):
         drawing = drawing_from_array(source, f"the {viewpoint.name} drawing")
     else:
         drawing = load_drawing(source)
     cutout = cut_out(drawing, segment)
-    return _Figure(viewpoint, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
+    return DrawnFigure(viewpoint, drawing, cutout, figure_box(cutout.rgba[..., 3], drawing.name))
 
 
-def _without_gaps(figures: Sequence[_Figure]) -> list[_Figure]:
+def _without_gaps(figures: Sequence[DrawnFigure]) -> list[DrawnFigure]:
     """The figures seen through where they and the opposite view enclose paper at mirrored places."""
     opened = list(figures)
     for first, second in combinations(range(len(figures)), 2):
@@ -221,7 +200,7 @@ def _are_opposite(one: Viewpoint, other: Viewpoint) -> bool:
     return abs(apart - 180.0) < NEAR and one.elevation_deg == other.elevation_deg == 0.0
 
 
-def _without_ink(figures: Sequence[_Figure]) -> tuple[list[_Figure], tuple[str, ...]]:
+def _without_ink(figures: Sequence[DrawnFigure]) -> tuple[list[DrawnFigure], tuple[str, ...]]:
     """The figures without lines along their outlines, and a sentence; as they are where few outlines have any."""
     found = [find_outline_ink(figure.cutout.rgba) for figure in figures]
     share = sum(one.share for one in found) / len(found)
@@ -237,7 +216,7 @@ def _without_ink(figures: Sequence[_Figure]) -> tuple[list[_Figure], tuple[str, 
     )
 
 
-def _with_side(figures: Sequence[_Figure]) -> list[_Figure]:
+def _with_side(figures: Sequence[DrawnFigure]) -> list[DrawnFigure]:
     """The figures with a side that is guessed where none is drawn: it stands for a three-quarter view, or last."""
     found = missing_side({figure.viewpoint: figure.cutout.rgba for figure in figures})
     if found is None:
@@ -245,12 +224,12 @@ def _with_side(figures: Sequence[_Figure]) -> list[_Figure]:
     side, rgba = found
     name = f"the {side.name} side"
     drawing = Drawing(rgba, name, (rgba.shape[1], rgba.shape[0]), lossy=False)
-    guess = _Figure(side, drawing, Cutout(rgba, ()), figure_box(rgba[..., 3], name), is_guessed=True)
+    guess = DrawnFigure(side, drawing, Cutout(rgba, ()), figure_box(rgba[..., 3], name), is_guessed=True)
     with_it = [guess if is_between(figure.viewpoint.azimuth_deg) else figure for figure in figures]
     return with_it if guess in with_it else [*with_it, guess]
 
 
-def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[str]:
+def _assumptions(figures: Sequence[DrawnFigure], extent: float, size: int) -> list[str]:
     """What was done to single drawings."""
     lines = []
     figures = [figure for figure in figures if not figure.is_guessed]
@@ -278,67 +257,6 @@ def _assumptions(figures: Sequence[_Figure], extent: float, size: int) -> list[s
     return lines
 
 
-def _doubts(
-    figures: Sequence[_Figure], canvases: Sequence[np.ndarray], extent: float, agreement: Reconciliation
-) -> tuple[Doubt, ...]:
-    """What looks wrong."""
-    small = _small_figures(figures, extent, canvases[0].shape[0])
-    between = [
-        Doubt(
-            one.name,
-            "seen from between front, side and back, which the released weights were trained on: with it pictures came out worse"
-            " (docs/drawings.md). Compare without it.",
-        )
-        for one in between_square_ones([figure.viewpoint for figure in figures])
-    ]
-    guessed = [Doubt(figure.drawing.name, GUESSED) for figure in figures if figure.is_guessed]
-    apart = (*_disagreements(agreement, figures), *_other_designs(canvases, figures))
-    return (*guessed, *small, *_turned_sides(canvases, figures), *apart, *between)
-
-
-def _small_figures(figures: Sequence[_Figure], extent: float, size: int) -> list[Doubt]:
-    return [
-        Doubt(
-            figure.drawing.name,
-            f"the figure is {figure.box.height:.0f} pixels tall, fewer than the model reads: use a larger picture.",
-        )
-        for figure in figures
-        if figure.box.height * 2.0 * extent / HEIGHT < 0.5 * size
-    ]
-
-
-def _turned_sides(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[Doubt]:
-    """Profiles whose front half has the back's colours, so that they look to the other side than their names say."""
-    shown = {figure.viewpoint.name: canvas for figure, canvas in zip(figures, canvases, strict=True)}
-    doubts = []
-    for figure in figures:
-        name = figure.viewpoint.name
-        if name not in ("left", "right") or not {"front", "back"} <= set(shown):
-            continue
-        if colors_look_left(shown[name], shown["front"], shown["back"]) == (name == "right"):
-            other = "right" if name == "left" else "left"
-            sentence = (
-                f"by the colours of front and back it looks to the picture's {other}, and so shows the character's {other} side."
-                f" If it does, say --side {other}, or of a sheet --figure {other}=N."
-            )
-            doubts.append(Doubt(figure.drawing.name, sentence, DoubtKind.MIRRORED))
-    return doubts
-
-
-def _other_designs(canvases: Sequence[np.ndarray], figures: Sequence[_Figure]) -> list[Doubt]:
-    """Drawings in other colours than the first one's."""
-    first, *others = [palette(canvas) for canvas in canvases]
-    return [
-        Doubt(
-            figure.drawing.name,
-            f"shares only {100 * share:.0f} % of its colours with {figures[0].drawing.name}: are both of one character and design?"
-            " Give drawings of one, or leave this out.",
-        )
-        for figure, share in zip(figures[1:], (shared_colors(first, one) for one in others), strict=True)
-        if share < FEW_SHARED
-    ]
-
-
 def _shrunk(drawing: Drawing) -> float:
     """Pixels of the file per pixel worked with."""
     return drawing.size[1] / drawing.rgba.shape[0]
@@ -361,36 +279,3 @@ def _mended(agreement: Reconciliation, names: Sequence[str], reconciled: bool) -
                 f" {names[0]}."
             )
     return lines
-
-
-def _disagreements(agreement: Reconciliation, figures: Sequence[_Figure]) -> list[Doubt]:
-    """What looks wrong between drawings."""
-    doubts = []
-    for figure, view in zip(figures, agreement.views, strict=True):
-        name = figure.drawing.name
-        if view.copies is not None:
-            sentence = (
-                f"shows the same as {figures[view.copies].drawing.name}: was one file used twice? Give the {figure.viewpoint.name}"
-                " view, or leave it out."
-            )
-            doubts.append(Doubt(name, sentence, DoubtKind.COPIED))
-        elif view.partner is not None and view.iou_unmirrored > view.iou_before + 0.02:
-            sentence = (
-                f"the {figure.viewpoint.name} fits the {figures[view.partner].viewpoint.name} better unmirrored (IoU"
-                f" {view.iou_unmirrored:.2f} against {view.iou_before:.2f}): seen from the other side, left and right are swapped."
-                " Was it traced? Mirror the drawing if so."
-            )
-            doubts.append(Doubt(name, sentence, DoubtKind.MIRRORED))
-        if view.partner is not None and view.iou_before < LEAST_AGREEMENT:
-            sentence = (
-                f"its outline shares only {100 * view.iou_before:.0f} % with the mirrored"
-                f" {figures[view.partner].viewpoint.name}'s (IoU, expected {100 * LEAST_AGREEMENT:.0f} % or more): the drawings"
-                f" differ in pose, are not of one character, or were given in another order than front, side, back"
-            )
-            end = "." if view.is_trusted else "; it could not be reconciled, colours may be misplaced."
-            doubts.append(Doubt(name, sentence + end))
-        if np.isinf(view.tolerance).all():
-            doubts.append(
-                Doubt(name, "fits none of the views before it; it colours the figure but does not shape it.")
-            )
-    return doubts
