@@ -65,11 +65,10 @@ def _contents(file):
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
-        ("grid.index", lambda one: one + 10**6, "grid.index: found rows"),
         ("grid.color_index", lambda one: one - 5, "grid.color_index: found rows"),
-        ("grid.rows", lambda one: one * float("nan"), "grid.rows: found values that are not finite"),
-        ("grid.rows", lambda one: one[:, :2].contiguous(), "grid.rows: found"),
-        ("grid.gaps", lambda one: one[:-1].contiguous(), "grid.index: found"),
+        ("grid.u", lambda one: one * float("nan"), "grid.u: found values that are not finite"),
+        ("grid.kept", lambda one: one.float(), "grid.kept: found"),
+        ("grid.gaps", lambda one: one[:-1].contiguous(), "grid.u: found"),
         ("grid.color_rows", lambda one: one[:, 1:].contiguous(), "grid.color_rows: found"),
         ("views.present", lambda one: one.float(), "views: found images"),
         ("drawn.encoded", None, "lacks a part of a baked character"),
@@ -101,4 +100,4 @@ def test_other_files_are_refused(file, tmp_path):
     other.write_bytes(b"no tensors")
     with pytest.raises(DataError, match="safetensors"):
         load_baked(other)
-    assert torch.is_tensor(tensors["grid.rows"])
+    assert torch.is_tensor(tensors["grid.u"])

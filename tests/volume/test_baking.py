@@ -8,7 +8,14 @@ import torch
 from charnerf.geometry.cameras import pixel_lattice, project_into_all
 from charnerf.volume.baking.bake import _expected_errors, _without_bias
 from charnerf.volume.baking.directions import polynomials, projection, sampled_directions
-from charnerf.volume.baking.grid import EMPTY_U, combined, densities_from_u, interpolated, u_from_densities
+from charnerf.volume.baking.grid import (
+    EMPTY_U,
+    between,
+    combined,
+    densities_from_u,
+    interpolated,
+    u_from_densities,
+)
 from charnerf.volume.baking.lattice import corners_of, finer_points, gaps, light_depths
 from support import helpers
 
@@ -32,6 +39,8 @@ def test_functions_linear_along_each_axis_are_read_exactly():
     corners = places[[0, -1]].double()
     for asked in (at, corners):
         torch.testing.assert_close(interpolated(index, values(places[order]), asked), values(asked))
+        volumes = values(places).view(*SHAPE, 2).unbind(-1)
+        torch.testing.assert_close(torch.stack(between(volumes, asked.t()), dim=-1), values(asked))
 
 
 def test_densities_survive_their_scale():
@@ -112,14 +121,14 @@ def test_curved_values_are_right_in_the_mean_between_points():
     """Along each axis, of a parabola: bent at the lattice's points nothing moves; beside nothing neither."""
     shape = (5, 5, 5)
     places = torch.ones(shape).nonzero()
-    index = torch.arange(125, dtype=torch.int32).view(shape) + 2
+    index = torch.arange(125, dtype=torch.int32).view(shape)
     for axis in range(3):
         along = places[:, axis].double()
         moved = _without_bias(-0.5 * along**2, index, places, 2)
         fine = torch.linspace(0.0, 4.0, 4001, dtype=torch.float64)
         at = torch.full((4001, 3), 1.0, dtype=torch.float64)
         at[:, axis] = fine
-        error = interpolated(index - 2, moved[:, None], at)[:, 0] + 0.5 * fine**2
+        error = interpolated(index, moved[:, None], at)[:, 0] + 0.5 * fine**2
         assert abs(float(error.mean())) < 1e-3
         bent = -(along - 2.0).abs()
         torch.testing.assert_close(_without_bias(bent, index, places, 2), bent)

@@ -1,11 +1,11 @@
 """Baked characters as files: written once, looked at without any network.
 
 A safetensors file in this layout; X, Y, Z points of the fine grid along the world's axes, x = (X - 1) / factor cells of the lattice
-that it divides, likewise y and z; N and M rows; V drawings; C values that a colour is made of; metres:
+that it divides, likewise y and z; M rows; V drawings; C values that a colour is made of; metres:
 
     grid.low, grid.high, grid.origin   (3,) float32   where the character is; the grid's first point
-    grid.index          (X, Y, Z) int32               a point's row in grid.rows: 0 holds nothing, 1 lets no light through
-    grid.rows           (N, 3) float32                u, factor f, error in 1/m of the density 20 softplus(u) min(f, 1)
+    grid.u, grid.kept   (X, Y, Z) float32, float16    u and f of the density 20 softplus(u) min(f, 1), 1/m
+    grid.errors         (x, y, z) float32             of densities in the lattice's cells, 1/m
     grid.color_index    (x + 1, y + 1, z + 1) int32   a lattice point's row in grid.color_rows
     grid.color_rows     (M, 9 C + 1) float32          coefficients of 9 polynomials of the direction for each of C values; error
     grid.gaps           (x, y, z) uint8               cells to the next one that holds something
@@ -49,12 +49,12 @@ from charnerf.volume.baking.grid import BakedGrid
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.baked import BakedRenderer
 
-FORMAT = "charnerf-baked-1"
+FORMAT = "charnerf-baked-2"
 HEADS: dict[str, type[AbstractHead]] = {"blend": BlendHead, "radiance": RadianceHead}
 NUM_VALUES = {"blend": lambda views: views + 4, "radiance": lambda views: 3}
 GRID = {
-    "low": torch.float32, "high": torch.float32, "origin": torch.float32, "index": torch.int32, "rows": torch.float32,
-    "color_index": torch.int32, "color_rows": torch.float32, "gaps": torch.uint8,
+    "low": torch.float32, "high": torch.float32, "origin": torch.float32, "u": torch.float32,
+    "kept": torch.float16, "errors": torch.float32, "color_index": torch.int32, "color_rows": torch.float32, "gaps": torch.uint8,
 }  # fmt: skip
 CAMERA = ("poses", "focal", "principal_point", "orthographic")
 
@@ -133,7 +133,7 @@ def load_baked(path: str | Path) -> Hero:
         raise DataError(f"{file}: lacks a part of a baked character ({error}); bake it again.") from error
     _check(file, grid, facts, views, len(drawn))
     paint = DrawnColoring(HEADS[facts["head"]], cameras, encoded, tensors.get("drawn.detailed"), encoded)
-    baked = Baked(grid, 1, 0, 0, grid.index.numel(), 0.0)
+    baked = Baked(grid, 1, 0, 0, grid.u.numel(), 0.0)
     return Hero(
         scene=Scene(BakedField(baked, paint, None), None, Bounds(grid.low, grid.high)),
         views=views,
@@ -205,8 +205,9 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
     columns = NUM_POLYNOMIALS * NUM_VALUES[facts["head"]](num_drawn) + 1
     expected = {
         "low": (3,), "high": (3,), "origin": (3,),
-        "index": tuple(facts["factor"] * n + 1 for n in cells),
-        "rows": (len(grid.rows), 3),
+        "u": (points := tuple(facts["factor"] * n + 1 for n in cells)),
+        "kept": points,
+        "errors": cells,
         "color_index": tuple(n + 1 for n in cells),
         "color_rows": (len(grid.color_rows), columns),
     }  # fmt: skip
@@ -223,15 +224,11 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
             )
         if value.dtype.is_floating_point and not bool(value.isfinite().all()):
             raise DataError(f"{file}: grid.{name}: found values that are not finite, expected numbers.")
-    for name, index, rows in (
-        ("index", grid.index, grid.rows),
-        ("color_index", grid.color_index, grid.color_rows),
-    ):
-        low, high = (int(one) for one in torch.aminmax(index))
-        if low < 0 or high >= len(rows):
-            raise DataError(
-                f"{file}: grid.{name}: found rows {low} to {high}, expected 0 to {len(rows) - 1}."
-            )
+    low, high = (int(one) for one in torch.aminmax(grid.color_index))
+    if low < 0 or high >= len(grid.color_rows):
+        raise DataError(
+            f"{file}: grid.color_index: found rows {low} to {high}, expected 0 to {len(grid.color_rows) - 1}."
+        )
     marks = (views.present, views.mirrored)
     whole = (
         views.images.ndim == len("BVCHW")

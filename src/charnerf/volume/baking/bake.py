@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from charnerf.scene import Scene
 from charnerf.volume.baking.directions import (
@@ -20,9 +21,7 @@ from charnerf.volume.baking.directions import (
     sampled_directions,
 )
 from charnerf.volume.baking.grid import (
-    EMPTY,
     EMPTY_U,
-    OPAQUE,
     OPAQUE_U,
     SCALE,
     BakedGrid,
@@ -100,7 +99,7 @@ def bake(
     lattice = coarse.lattice
     on_points = _counter(on_share, LATTICE_PART, 1.0, coarse.num_left(factor))
     fine = _Fine.of(scene, coarse, factor, on_points)
-    beyond = finer_points(any_corner(coarse.dark) & ~coarse.holding, factor) & (fine.index == EMPTY)
+    beyond = finer_points(any_corner(coarse.dark) & ~coarse.holding, factor) & ~fine.used
     color_index, color_rows = _colors(scene, coarse, on_points)
     low, high = scene.bounds.tight_box
     grid = BakedGrid(
@@ -109,8 +108,9 @@ def bake(
         origin=lattice.origin,
         pitch=lattice.pitch,
         factor=factor,
-        index=torch.where(beyond, OPAQUE, fine.index).int(),
-        rows=fine.rows,
+        u=fine.u.masked_fill_(beyond, OPAQUE_U),
+        kept=fine.kept.masked_fill_(beyond, 1.0).half(),
+        errors=_of_cells(fine.errors, factor),
         color_index=color_index,
         color_rows=color_rows,
         gaps=gaps(coarse.holding),
@@ -121,7 +121,7 @@ def bake(
         coarser=coarser,
         num_densities=asked + fine.num_evaluated,
         num_colors=len(color_rows) - 1,
-        num_points=fine.index.numel(),
+        num_points=fine.u.numel(),
         seconds=time.perf_counter() - start,
     )
 
@@ -202,9 +202,10 @@ class _Coarse:
     def mib(self, factor: int, has_colors: bool) -> float:
         """What its grid takes, about, MiB."""
         colors = int(corners_of(self.refined).sum()) * NUM_POLYNOMIALS * TYPICAL_VALUES if has_colors else 0
-        points = int(finer_points(self.holding, factor).sum())
-        indices = self.u.numel() * (factor**3 + 1 + 0.25)  # of both grids, and the gaps
-        return 4.0 * (indices + 3 * points + colors) / 2**20
+        densities = self.u.numel() * (
+            1.5 * factor**3 + 2.25
+        )  # u and the share kept; colours' index, errors and gaps
+        return 4.0 * (densities + colors) / 2**20
 
 
 def _counter(on_share: OnShare, low: float, high: float, total: int) -> Callable[[int], None]:
@@ -246,10 +247,12 @@ def _expected_errors(u: Tensor, kept: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class _Fine:
-    """The fine grid: index of its points, 0 where they are in no cell that holds something; rows, the first two as `grid` says."""
+    """The fine grid: which of its points are in cells that hold something; u, shares kept and errors, 1/m, of all, (X, Y, Z)."""
 
-    index: Tensor
-    rows: Tensor
+    used: Tensor
+    u: Tensor
+    kept: Tensor
+    errors: Tensor
     num_evaluated: int
 
     @classmethod
@@ -262,7 +265,7 @@ class _Fine:
         lattice, used = coarse.lattice, finer_points(coarse.holding, factor)
         places = used.nonzero()
         index = used.int()
-        index[used] = torch.arange(2, len(places) + 2, dtype=torch.int32, device=index.device)
+        index[used] = torch.arange(len(places), dtype=torch.int32, device=index.device)
         rows = torch.stack([one.reshape(-1) for one in (coarse.u, coarse.kept, coarse.errors)], dim=-1)
         numbers = torch.arange(len(rows), dtype=torch.int32, device=index.device).view(lattice.shape)
         filled = interpolated(numbers, rows, places.to(rows.dtype) / factor)
@@ -273,9 +276,11 @@ class _Fine:
         off = (cut_densities(us, shares) - cut_densities(filled[new, 0], filled[new, 1])).abs()
         filled[new] = torch.stack((us, shares, off / factor**2), dim=-1)
         filled[:, 0] = _without_bias(filled[:, 0], index, places, factor)
-        fixed = rows.new_tensor(((EMPTY_U, 0.0, 0.0), (OPAQUE_U, 1.0, 0.0)))
-        filled = torch.cat((fixed, filled))
-        return cls(index, filled, len(us))
+        spread = [rows.new_full(used.shape, nothing) for nothing in (EMPTY_U, 0.0, 0.0)]
+        for volume, values in zip(spread, filled.unbind(-1), strict=True):
+            volume[used] = values
+        spread_u, spread_kept, spread_errors = spread
+        return cls(used, spread_u, spread_kept, spread_errors, len(us))
 
 
 def _without_bias(u: Tensor, index: Tensor, places: Tensor, factor: int) -> Tensor:
@@ -286,7 +291,7 @@ def _without_bias(u: Tensor, index: Tensor, places: Tensor, factor: int) -> Tens
 
     Args:
         u: As it was found.
-        index: 2 more than the numbers of the places, (X, Y, Z).
+        index: Numbers of the places, (X, Y, Z).
         places: Points of the fine grid.
         factor: Steps of it in one of the lattice.
     """
@@ -297,11 +302,16 @@ def _without_bias(u: Tensor, index: Tensor, places: Tensor, factor: int) -> Tens
     for axis in range(3):
         inner = (places[:, axis] % factor != 0).nonzero()[:, 0]
         step = torch.eye(3, dtype=places.dtype, device=places.device)[axis]
-        before, after = (u[index[tuple((places[inner] + way).T)].long() - 2] for way in (-step, step))
+        before, after = (u[index[tuple((places[inner] + way).T)].long()] for way in (-step, step))
         curve = 2.0 * u[inner] - before - after
         jumps = torch.minimum(torch.minimum(before, after), u[inner]) <= EMPTY_U
         moved[inner] += torch.where(jumps, 0.0, share * curve)
     return moved
+
+
+def _of_cells(values: Tensor, factor: int) -> Tensor:
+    """Means of values (X, Y, Z) of the fine grid over the lattice's cells, ((X - 1) / factor, ...), their borders included."""
+    return F.avg_pool3d(values[None, None], factor + 1, stride=factor)[0, 0]
 
 
 def _colors(scene: Scene, coarse: _Coarse, on_points: Callable[[int], None]) -> tuple[Tensor, Tensor]:

@@ -1,7 +1,7 @@
 """One character on a grid: what was evaluated once and is interpolated from then on.
 
-Letters: X, Y, Z points of the fine grid along the axes; N rows of densities, M rows of colours; B polynomials of the direction, C
-values that a colour is made of; P points.
+Letters: X, Y, Z points of the fine grid along the axes; M rows of colours; B polynomials of the direction, C values that a colour
+is made of; P points, whose coordinates lie one after the other, (3, P), where densities are read: many, and in passes over memory.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,6 @@ from charnerf.types import MovableRecord
 
 SCALE = 20.0  # 1/m: a density is kept as u, SCALE * softplus(u), which runs straighter between points than it does itself
 EMPTY_U, OPAQUE_U = -14.0, 8.0  # of no density, and of what no light passes
-EMPTY, OPAQUE = 0, 1  # rows of points that hold nothing, and that no light reaches
 LINEAR = 20.0  # from here on softplus(u) is u to rounding
 
 
@@ -47,8 +46,9 @@ class BakedGrid(MovableRecord):
         origin: Of grid and lattice, (3,), m.
         pitch: Of the lattice, m.
         factor: Steps of the fine grid in one of the lattice.
-        index: Rows of the fine grid's points, (X, Y, Z) int32.
-        rows: u, the share of the density that is left (above 1 all), and the density's error, 1/m, of points, (N, 3).
+        u: Of the fine grid's points, (X, Y, Z).
+        kept: The share of their densities that is left, above 1 all, (X, Y, Z) float16.
+        errors: Of the densities in the lattice's cells, ((X - 1) / factor, ...), 1/m.
         color_index: Rows of the lattice's points, ((X - 1) / factor + 1, ...) int32.
         color_rows: Coefficients of what colours are made of, and the colours' error, (M, B * C + 1); (1, 1) without colours.
         gaps: Cells, at most 255, from each of the lattice ((X - 1) / factor, ...) to the next one that holds something, along the
@@ -60,8 +60,9 @@ class BakedGrid(MovableRecord):
     origin: Tensor
     pitch: float
     factor: int
-    index: Tensor
-    rows: Tensor
+    u: Tensor
+    kept: Tensor
+    errors: Tensor
     color_index: Tensor
     color_rows: Tensor
     gaps: Tensor
@@ -79,23 +80,43 @@ class BakedGrid(MovableRecord):
     @property
     def mib(self) -> float:
         """Memory that it takes."""
-        tensors = (self.index, self.rows, self.color_index, self.color_rows, self.gaps)
+        tensors = (self.u, self.kept, self.errors, self.color_index, self.color_rows, self.gaps)
         return sum(one.numel() * one.element_size() for one in tensors) / 2**20
 
     def densities_at(self, points: Tensor) -> Tensor:
         """Densities (P,), 1/m, at points (P, 3), m."""
         inside = ((points >= self.low) & (points <= self.high)).all(-1)
-        return self.read_densities((points - self.origin) / self.step)[0] * inside
+        return self.read_densities(((points - self.origin) / self.step).t().contiguous()) * inside
 
-    def read_densities(self, at: Tensor) -> tuple[Tensor, Tensor]:
-        """Densities (P,) and their errors (P,), 1/m, at places (P, 3) counted in steps of the fine grid."""
-        u, kept, error = interpolated(self.index, self.rows, at).unbind(-1)
-        return cut_densities(u, kept), error
+    def read_densities(self, at: Tensor) -> Tensor:
+        """Densities (P,), 1/m, at places (3, P) counted in steps of the fine grid."""
+        return cut_densities(*between((self.u, self.kept), at))
 
     def read_colors(self, at: Tensor, polynomials: Tensor) -> tuple[Tensor, Tensor]:
         """What colours are made of (P, C) by polynomials (P, B), and their errors (P,), at places (P, 3) in the lattice's cells."""
         read = interpolated(self.color_index, self.color_rows, at)
         return combined(read[:, :-1], polynomials), read[:, -1]
+
+
+def between(volumes: tuple[Tensor, ...], at: Tensor) -> list[Tensor]:
+    """Values (P,) of volumes (X, Y, Z) at places (3, P) counted in their steps, in the places' precision.
+
+    Corner by corner for all places: half the time of `interpolated`, for volumes whose points all have a value.
+    """
+    _, size_y, size_z = volumes[0].shape
+    low = torch.minimum(at.floor().clamp_min_(0.0), at.new_tensor(volumes[0].shape)[:, None] - 2.0)
+    second = at - low
+    x, y, z = low.int()
+    corner, first = (x * size_y + y).mul_(size_z).add_(z), 1.0 - second
+    flat, totals = [one.reshape(-1) for one in volumes], [at.new_zeros(at.shape[1]) for _ in volumes]
+    for a, near_x in enumerate((first[0], second[0])):
+        for b, near_y in enumerate((first[1], second[1])):
+            near = near_x * near_y
+            for c, near_z in enumerate((first[2], second[2])):
+                weight, here = near * near_z, corner + ((a * size_y + b) * size_z + c)
+                for values, total in zip(flat, totals, strict=True):
+                    total.addcmul_(values.index_select(0, here).to(at.dtype), weight)
+    return totals
 
 
 def interpolated(index: Tensor, rows: Tensor, at: Tensor) -> Tensor:

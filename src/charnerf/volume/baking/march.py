@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.rays import box_interval
-from charnerf.types import RayBundle, TensorRecord
+from charnerf.types import MovableRecord, RayBundle, TensorRecord
 from charnerf.volume.baking.grid import BakedGrid
 
 AT_ONCE = 3  # samples of a ray between two looks at how much light is left: a group
@@ -48,18 +48,42 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class _UnderWay(TensorRecord):
-    """Rays (r,) under way: their numbers, where they began and go, in cells of the lattice, where they are and end, m."""
+class _UnderWay(MovableRecord):
+    """Rays under way: their numbers (r,); where they began and go (3, r), in cells of the lattice; where they are and end (r,), m.
+
+    Coordinates lie one after the other, so that every step is few long passes over memory.
+    """
 
     numbers: Tensor
     origins: Tensor
     directions: Tensor
+    slowness: Tensor  # m a cell along each axis, (3, r)
     t_vals: Tensor
     ends: Tensor
 
+    @classmethod
+    def of(cls, grid: BakedGrid, rays: RayBundle, near: Tensor, far: Tensor) -> "_UnderWay":
+        """Those of rays (R,) that are within a grid somewhere, from near to far (R,), m."""
+        numbers = (far > near).nonzero()[:, 0]
+        some = rays.rows(numbers)
+        directions = (some.directions / grid.pitch).t().contiguous()
+        return cls(
+            numbers,
+            ((some.origins - grid.origin) / grid.pitch).t().contiguous(),
+            directions,
+            directions.abs().clamp_min_(1e-6).reciprocal_(),
+            near[numbers],
+            far[numbers],
+        )
+
+    def some(self, index: Tensor) -> "_UnderWay":
+        """Those of numbers (n,) among these."""
+        return self._map(lambda value: value.index_select(-1, index))
+
     def at(self, t_vals: Tensor) -> Tensor:
-        """Places (r, S, 3) at distances (r, S), m, counted in cells."""
-        return torch.addcmul(self.origins[:, None], self.directions[:, None], t_vals[..., None])
+        """Places (3, ..., r) at distances (..., r), m, counted in cells."""
+        shape = (3, *[1] * (t_vals.ndim - 1), -1)
+        return torch.addcmul(self.origins.view(shape), self.directions.view(shape), t_vals)
 
 
 @dataclass(frozen=True)
@@ -73,9 +97,9 @@ class _Groups(TensorRecord):
 
     @classmethod
     def of(cls, rays: Tensor, samples: Tensor, weights: Tensor, before: Tensor, least: float) -> "_Groups":
-        """Those of samples (r, S) of rays (r,) that take enough light."""
-        total = weights.sum(-1)
-        middles = (weights * samples).sum(-1) / total
+        """Those of samples (S, r) of rays (r,) that take enough light."""
+        total = weights.sum(0)
+        middles = (weights * samples).sum(0) / total
         return cls(rays, middles, total, before).rows((total > least).nonzero()[:, 0])
 
     def by_light(self, num_rays: int, same_color: float) -> "_Groups":
@@ -104,36 +128,30 @@ def march(grid: BakedGrid, rays: RayBundle, *, unseen: float, same_color: float 
     """
     near, far = box_interval(rays, grid.low, grid.high)
     light, errors, spacing = torch.ones_like(near), torch.zeros_like(near), SPACING * grid.step
-    numbers = (far > near).nonzero()[:, 0]
-    way = _UnderWay(
-        numbers,
-        (rays.origins[numbers] - grid.origin) / grid.pitch,
-        rays.directions[numbers] / grid.pitch,
-        near[numbers],
-        far[numbers],
-    )
-    offsets = (torch.arange(AT_ONCE, dtype=near.dtype, device=near.device) + 0.5) * spacing
-    groups = [_Groups(numbers[:0], near[:0], near[:0], near[:0])]
-    num_samples = 0
+    way = _UnderWay.of(grid, rays, near, far)
+    offsets = (torch.arange(AT_ONCE, dtype=near.dtype, device=near.device)[:, None] + 0.5) * spacing
+    groups, num_samples = [_Groups(way.numbers[:0], near[:0], near[:0], near[:0])], 0
     while len(way.numbers):
-        gap, free = _free_way(grid, way)
+        cells, free = _free_way(grid, way)
         t_vals = way.t_vals + free
-        holding = (gap == 0).nonzero()[:, 0]
+        holding = (free == 0.0).nonzero()[:, 0]
         if len(holding):
-            here = way.rows(holding)
-            samples = here.t_vals[:, None] + offsets
-            lengths = (here.ends[:, None] - samples + 0.5 * spacing).clamp(0.0, spacing)
-            depths, off = _read(grid, here.at(samples), lengths)
-            before = light.index_select(0, here.numbers)[:, None]
-            after = before * torch.exp(-depths.cumsum(-1))
-            weights = torch.cat((before, after[:, :-1]), dim=-1) - after
-            light.index_copy_(0, here.numbers, after[:, -1])
-            errors.index_add_(0, here.numbers, (after * off).square().sum(-1))
-            groups.append(_Groups.of(here.numbers, samples, weights, before[:, 0], FAINT_SHARE * unseen))
+            here = way.some(holding)
+            samples = here.t_vals + offsets
+            lengths = (here.ends - samples).add_(0.5 * spacing).clamp_(0.0, spacing)
+            at = here.at(samples).mul_(grid.factor).view(3, -1)
+            depths = grid.read_densities(at).view(samples.shape) * lengths
+            before = light.index_select(0, here.numbers)
+            after = before * torch.exp(-depths.cumsum(0))
+            weights = torch.cat((before[None], after[:-1])) - after
+            light.index_copy_(0, here.numbers, after[-1])
+            off = grid.errors.view(-1).index_select(0, cells.index_select(0, holding))
+            errors.index_add_(0, here.numbers, (after * lengths).square_().sum(0) * off.square())
+            groups.append(_Groups.of(here.numbers, samples, weights, before, FAINT_SHARE * unseen))
             t_vals.index_copy_(0, holding, here.t_vals + AT_ONCE * spacing)
             num_samples += samples.numel()
         on = ((t_vals < way.ends) & (light.index_select(0, way.numbers) > unseen)).nonzero()[:, 0]
-        way = replace(way, t_vals=t_vals).rows(on)
+        way = replace(way, t_vals=t_vals).some(on)
     found = _Groups.joined(groups)
     moments = torch.zeros_like(light).index_add_(0, found.rays, found.weights * found.t_vals)
     places = found.by_light(len(light), same_color)
@@ -141,20 +159,17 @@ def march(grid: BakedGrid, rays: RayBundle, *, unseen: float, same_color: float 
 
 
 def _free_way(grid: BakedGrid, way: _UnderWay) -> tuple[Tensor, Tensor]:
-    """Cells (r,) from where rays are to the next one that holds something, and how far they may go on until then, m; 0 in it."""
+    """Numbers (r,) of the cells that rays are in, and how far they may go until the next that holds something, m; 0 in it."""
     size_x, size_y, size_z = grid.gaps.shape
-    at = way.at(way.t_vals[:, None])[:, 0]
-    x, y, z = at.int().unbind(-1)
-    flat = (x.clamp(0, size_x - 1) * size_y + y.clamp(0, size_y - 1)) * size_z + z.clamp(0, size_z - 1)
-    gap = grid.gaps.reshape(-1).index_select(0, flat)
+    at = way.at(way.t_vals)
+    x, y, z = at.int()
+    cells = (
+        (x.clamp_(0, size_x - 1) * size_y + y.clamp_(0, size_y - 1))
+        .mul_(size_z)
+        .add_(z.clamp_(0, size_z - 1))
+    )
+    gap = grid.gaps.view(-1).index_select(0, cells)
     inside = at - at.floor()
     left = torch.where(way.directions < 0.0, inside, 1.0 - inside)  # to the border of the own cell
-    across = (left + (gap - 1.0)[:, None]) / way.directions.abs().clamp_min(1e-6)
-    free = torch.minimum(torch.minimum(across[:, 0], across[:, 1]), across[:, 2]) + BORDER
-    return gap, torch.where(gap > 0, free, 0.0)
-
-
-def _read(grid: BakedGrid, at: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
-    """Optical depths (r, S) of samples at places (r, S, 3), in cells, that stand for lengths (r, S), m, and their errors."""
-    densities, errors = grid.read_densities(at.reshape(-1, 3) * grid.factor)
-    return densities.view(lengths.shape) * lengths, errors.view(lengths.shape) * lengths
+    free = (left + (gap - 1.0)).mul_(way.slowness).amin(0).add_(BORDER)
+    return cells, torch.where(gap > 0, free, 0.0)

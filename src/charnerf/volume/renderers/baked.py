@@ -21,7 +21,7 @@ from charnerf.volume.renderers.culled import CulledRenderer
 
 log = logging.getLogger(__name__)
 
-EXACT_SHARE = 0.6  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
+EXACT_SHARE = 0.5  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
 SAME_COLOR_SHARE = 0.8  # of the tolerance: share of a ray's light that has one colour
 TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
 
