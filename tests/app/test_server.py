@@ -51,7 +51,7 @@ def test_three_drawings_become_files_and_a_field_to_look_at(work, eggs):
                 for name in product["files"]
             }
             looks = [
-                (await page.ask("GET", f"look?azimuth={azimuth}&elevation=0&size=64"))[1]
+                (await page.ask("GET", f"look?azimuth={azimuth}&elevation=0&size=64&moving"))[1]
                 for azimuth in (0, 180)
             ]
             return product, contents, looks

@@ -13,6 +13,7 @@ from charnerf.errors import DataError
 from charnerf.inference.baked_file import load_baked, save_baked
 from charnerf.inference.hero import Hero
 from charnerf.volume.quadrature import PiecewiseConstant
+from charnerf.volume.renderers.baked import TURNING_TOLERANCE
 from charnerf.volume.renderers.culled import CulledRenderer
 from support import helpers, tiny_models
 
@@ -45,6 +46,14 @@ def test_a_file_gives_the_same_pictures_without_the_network(hero, file):
     assert seen[..., 3].max() > 0.1
     np.testing.assert_allclose(seen, alone.render(**LOOK), atol=1e-6)
     assert np.abs(seen[..., 3] - hero.render(**LOOK)[..., 3]).max() < 1e-6
+
+
+def test_while_it_turns_the_same_grid_is_looked_at_by_a_larger_tolerance(hero):
+    quick = hero.turning()
+    assert quick.scene is hero.scene and quick.turning() is quick
+    assert quick.renderer.tolerance == TURNING_TOLERANCE > hero.renderer.tolerance
+    off = np.abs(quick.render(**LOOK)[..., 3] - hero.render(**LOOK)[..., 3])
+    assert 0.0 < off.max() < TURNING_TOLERANCE
 
 
 def test_a_character_that_is_not_baked_is_refused(hero, tmp_path):

@@ -37,6 +37,7 @@ class Builder:
     def __init__(self, load: Callable[[], Model]) -> None:
         self.load = load
         self.baked: Hero | None = None
+        self.turning: Hero | None = None
 
     def build(self, figures: Sequence[Figure], plan: Plan, folder: Path) -> Product:
         """Make the character's files.
@@ -47,7 +48,7 @@ class Builder:
         """
         given = given_drawings(in_order(figures))
         done = reconstruct(self.load(), folder, plan.options, given, reading=plan.reading)
-        self.baked = done.baked
+        self.baked, self.turning = done.baked, done.baked.turning()
         levels, notes = _other_files(done, plan, folder)
         files = {
             "mesh.glb": "GLB: Blender, engines",
@@ -69,10 +70,11 @@ class Builder:
             seconds=done.seconds,
         )
 
-    def look(self, *, azimuth_deg: float, elevation_deg: float, size: int) -> bytes:
-        """A picture of the field as PNG, RGBA."""
-        assert self.baked is not None  # nobody looks before it is built
-        picture = self.baked.render(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, size=size)
+    def look(self, *, azimuth_deg: float, elevation_deg: float, size: int, moving: bool) -> bytes:
+        """A picture of the field as PNG, RGBA; one of many while it moves is less exact."""
+        assert self.baked is not None and self.turning is not None  # nobody looks before it is built
+        hero = self.turning if moving else self.baked
+        picture = hero.render(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, size=size)
         content = io.BytesIO()
         pixels = np.rint(255.0 * picture).astype(np.uint8)
         Image.fromarray(pixels).save(content, format="PNG", compress_level=1)

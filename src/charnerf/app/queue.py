@@ -145,7 +145,9 @@ class Queue:
             session.worker = None
             self.kept.remove(session)
 
-    async def look(self, session: Session, *, azimuth_deg: float, elevation_deg: float, size: int) -> bytes:
+    async def look(
+        self, session: Session, *, azimuth_deg: float, elevation_deg: float, size: int, moving: bool
+    ) -> bytes:
         """A picture of what was made, PNG.
 
         Raises:
@@ -156,7 +158,7 @@ class Queue:
             raise Refused(gone)
         try:
             picture: bytes = await session.worker.call(
-                "look", azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, size=size
+                "look", azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, size=size, moving=moving
             )
         except Ended as error:
             self.let_go(session)

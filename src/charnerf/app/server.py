@@ -290,7 +290,7 @@ async def _look(request: web.Request) -> web.Response:
             f"look: found {azimuth}, {elevation}, {size}, expected angles and a size. Load the page again."
         )
     picture = await request.app[STUDIO].queue.look(
-        session, azimuth_deg=azimuth, elevation_deg=elevation, size=size
+        session, azimuth_deg=azimuth, elevation_deg=elevation, size=size, moving="moving" in request.query
     )
     return web.Response(body=picture, content_type="image/png", headers=HEADERS)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -21,7 +21,7 @@ from charnerf.meshing.options import MeshOptions, Texture
 from charnerf.meshing.symmetry import symmetric_scene
 from charnerf.scene import Scene
 from charnerf.types import Cameras, SourceViews
-from charnerf.volume.renderers.baked import TOLERANCE, BakedRenderer
+from charnerf.volume.renderers.baked import TOLERANCE, TURNING_TOLERANCE, BakedRenderer
 from charnerf.volume.renderers.base import AbstractRenderer
 
 if TYPE_CHECKING:
@@ -132,8 +132,16 @@ class Hero:
         renderer = BakedRenderer(**self.renderer.settings, tolerance=tolerance)
         return replace(self, scene=renderer.prepared(self.scene, on_share), renderer=renderer)
 
+    def turning(self) -> Hero:
+        """A baked character as it is looked at while it turns: the same grid by a tolerance of 0.15, where it has a finer one."""
+        renderer = self.renderer
+        finer = isinstance(renderer, BakedRenderer) and 0.0 < renderer.tolerance < TURNING_TOLERANCE
+        return self.baked(TURNING_TOLERANCE) if finer else self
+
     def view(self, *, size: int = 256) -> Any:
         """A widget for a notebook that shows the character from where its sliders say; baked first, where it is not.
+
+        While a slider moves pictures are those of `turning`; where it rests they are exact to the renderer's tolerance.
 
         Args:
             size: Side of the picture, pixels.
@@ -145,10 +153,8 @@ class Hero:
         from charnerf.inference.notebook import turning
 
         baked = self if isinstance(self.renderer, BakedRenderer) else self.baked()
-        return turning(
-            lambda azimuth, elevation: baked.render(azimuth_deg=azimuth, elevation_deg=elevation, size=size),
-            size=size,
-        )
+        moving, still = (partial(_look, one, size=size) for one in (baked.turning(), baked))
+        return turning(moving, still, size=size)
 
     def lods(
         self,
@@ -226,3 +232,8 @@ class Hero:
         """Pinhole camera of shape () that frames the character."""
         camera = framing_camera(azimuth_deg, elevation_deg, radius=self.radius(), size=size)
         return camera.to(self.scene.bounds.box_min.device)
+
+
+def _look(hero: Hero, azimuth: int, elevation: int, *, size: int) -> np.ndarray:
+    """A picture at whole degrees."""
+    return hero.render(azimuth_deg=azimuth, elevation_deg=elevation, size=size)

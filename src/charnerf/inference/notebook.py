@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 from collections.abc import Callable
 from typing import Any
@@ -14,13 +15,18 @@ from charnerf.pictures import on_white, to_bytes
 
 FROM_ANGLE_DEG, FROM_ABOVE_DEG = 30, 10  # at first
 STEEPEST_DEG = 80
+RESTING_SECONDS = 0.3  # without a move: now it is worth to look closely
+
+Look = Callable[[int, int], np.ndarray]
+"""Gives RGBA floats (size, size, 4) in [0, 1], straight alpha, at an azimuth and an elevation, degrees."""
 
 
-def turning(render: Callable[[int, int], np.ndarray], *, size: int) -> Any:
-    """A widget that shows what a function renders at the azimuth and elevation, degrees, of its sliders.
+def turning(moving: Look, still: Look, *, size: int) -> Any:
+    """A widget that shows what is seen at the azimuth and elevation of its sliders.
 
     Args:
-        render: Gives RGBA floats (size, size, 4) in [0, 1], straight alpha.
+        moving: What is shown while a slider moves.
+        still: What is shown where they rest; always, where no event loop runs that could wait for that.
         size: Side of the picture, pixels.
 
     Raises:
@@ -40,12 +46,25 @@ def turning(render: Callable[[int, int], np.ndarray], *, size: int) -> Any:
     )
     picture = ipywidgets.Image(format="png", width=size, height=size)
 
-    def show(change: object = None) -> None:
-        picture.value = _png(render(azimuth.value, elevation.value))
+    resting: list[asyncio.TimerHandle] = []
+
+    def show(look: Look) -> None:
+        picture.value = _png(look(azimuth.value, elevation.value))
+
+    def moved(change: object) -> None:
+        while resting:
+            resting.pop().cancel()
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            show(still)
+            return
+        show(moving)
+        resting.append(loop.call_later(RESTING_SECONDS, show, still))
 
     for one in (azimuth, elevation):
-        one.observe(show, names="value")
-    show()
+        one.observe(moved, names="value")
+    show(still)
     return ipywidgets.VBox([picture, azimuth, elevation])
 
 

@@ -2,7 +2,7 @@
 
 const $ = (id) => document.getElementById(id);
 const LEFT_OUT = "", OTHER = "other";
-const LOOK = { moving: 224, still: 448 }; // pixels a side
+const LOOK = { moving: 256, still: 448 }; // pixels a side
 const REDUCED = matchMedia("(prefers-reduced-motion: reduce)");
 
 let form, session, state, swapping = null, sentReading = "";
@@ -464,8 +464,9 @@ async function look() {
       const where = `azimuth=${$("azimuth").value}&elevation=${$("elevation").value}`;
       const [seen, size] = looked?.split(" ") ?? [];
       if (seen === where && Number(size) === LOOK.still) break;
-      const wanted = seen === where ? LOOK.still : LOOK.moving;
-      await showLook(`${where}&size=${wanted}`);
+      const still = seen === where;
+      const wanted = still ? LOOK.still : LOOK.moving;
+      await showLook(`${where}&size=${wanted}${still ? "" : "&moving"}`);
       looked = `${where} ${wanted}`;
       if (turning) step();
     }

@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 EXACT_SHARE = 0.5  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
 SAME_COLOR_SHARE = 0.8  # of the tolerance: share of a ray's light that has one colour
 TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
+TURNING_TOLERANCE = 0.15  # the same of pictures that are gone in a tenth of a second
 
 
 @final
