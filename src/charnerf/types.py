@@ -275,7 +275,7 @@ class TrainBatch(MovableRecord):
         phase: Index of the schedule's phase.
         loss_weights: Weights that the phase overrides, by term.
         step: Index of the batch, from 0.
-        seeds: Of what is random about each of the B characters, here and in the renderer.
+        seeds: Of what renderer and loss draw for each of the B characters.
     """
 
     names: tuple[str, ...]

@@ -23,6 +23,7 @@ from charnerf.geometry.cameras import pixel_centres, pixel_rays, project
 from charnerf.geometry.hull import build_hull, occupied_edges
 from charnerf.losses.base import Needs
 from charnerf.models.views.turnaround import Turnaround
+from charnerf.pictures import on_white
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.types import SourceViews, TrainBatch
 from support import helpers
@@ -108,6 +109,15 @@ def test_the_same_request_makes_the_same_batch(figure_dataset, store):
     assert not same(dataset[request(4, surface_points=30)], first)
     assert not same(dataset_of(store, **settings, seed=6)[asked], first)
     assert dataset_of(store, **settings, seed=2**32 - 1)[asked].rgb.isfinite().all()
+
+
+def test_what_pixels_are_drawn_by_draws_nothing_else(store):
+    """The seed that a batch hands on, to renderer and loss, does not begin the stream that its pixels came from."""
+    batch = dataset_of(store, foreground_share=1.0)[request(rays=64)]
+    one = store.open(batch.names[0])
+    generator = torch.Generator().manual_seed(batch.seeds[0])
+    again = one.foreground[torch.randint(len(one.foreground), (64,), generator=generator)]
+    assert not torch.equal(on_white(one.images.reshape(-1, 4)[again].float() / 255.0), batch.rgb[0])
 
 
 def test_rays_carry_the_colors_that_the_figure_has(store):

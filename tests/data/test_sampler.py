@@ -90,3 +90,9 @@ def test_every_step_of_every_run_has_its_seed():
     draws = {torch.rand(1, generator=torch.Generator().manual_seed(seed)).item() for seed in seeds}
     assert len(draws) == 20
     assert len({step_seed(0, step) for step in range(10_000)}) >= 9_999
+
+
+def test_a_step_and_the_first_of_its_characters_have_seeds_of_their_own():
+    """NumPy fills a short list of words with zeros: (0, 5) and (0, 5, 0) would be one seed."""
+    places = [(5,), (5, 0), (5, 1), (5, 0, 0), (5, 0, 1), (0,), (0, 0)]
+    assert len({step_seed(0, *place) for place in places}) == len(places)

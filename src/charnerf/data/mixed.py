@@ -67,7 +67,7 @@ class MixedDataset(Dataset[TrainBatch]):
         first = self.share.process * self.characters
         return stack_batches(
             [
-                self._alone(chosen[place], step_seed(self.seed, request.step, place), request, points)
+                self._alone(chosen[place], place, request, points)
                 for place in range(first, first + self.characters)
             ],
             self.used_views,
@@ -81,9 +81,10 @@ class MixedDataset(Dataset[TrainBatch]):
         orders = [torch.randperm(there, generator=generator) for _ in range(-(-wanted // there))]
         return [names[int(index)] for index in torch.cat(orders)[:wanted]]
 
-    def _alone(self, name: str, seed: int, request: BatchRequest, surface_points: int) -> TrainBatch:
-        """A batch of one character."""
-        generator = torch.Generator().manual_seed(seed)
+    def _alone(self, name: str, place: int, request: BatchRequest, surface_points: int) -> TrainBatch:
+        """A batch of the character at a place among those of all processes."""
+        drawn_here, drawn_later = (step_seed(self.seed, request.step, place, stream) for stream in (0, 1))
+        generator = torch.Generator().manual_seed(drawn_here)
         one = self.store.open(name)
         rays, rgb, alpha, depth = self._rays(one, _count_each(request.rays, self.characters), generator)
         points = _count_each(surface_points, self.characters)
@@ -100,7 +101,7 @@ class MixedDataset(Dataset[TrainBatch]):
             phase=request.phase,
             loss_weights=request.loss_weights,
             step=request.step,
-            seeds=(seed,),
+            seeds=(drawn_later,),
         )
         return self.augmentation(batch, generator)
 

@@ -64,9 +64,9 @@ def step_seed(seed: int, *place: int) -> int:
 
     Args:
         seed: Of the run.
-        place: The step, and of what is random about one character its place in the step's batch.
+        place: The step; of what is random about one character also its place in the step's batch, and which of its streams.
     """
-    return int(np.random.SeedSequence((seed, *place)).generate_state(1)[0])
+    return int(np.random.SeedSequence(seed, spawn_key=place).generate_state(1)[0])
 
 
 @final
