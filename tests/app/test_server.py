@@ -73,7 +73,10 @@ def test_three_drawings_become_files_and_a_field_to_look_at(work, eggs):
         "mesh.obj",
         "mesh.png",
     ]
-    assert zipfile.ZipFile(io.BytesIO(contents["levels.zip"])).namelist() == ["mesh.glb", "mesh_LOD1.glb"]
+    assert zipfile.ZipFile(io.BytesIO(contents["levels.zip"])).namelist() == [
+        "mesh_LOD0.glb",
+        "mesh_LOD1.glb",
+    ]
     front, back = (np.asarray(Image.open(io.BytesIO(one)))[32, 32] for one in looks)
     assert front[0] > 200 > front[1] and back[1] > 150 > back[0]  # red in front, green behind
 

@@ -61,6 +61,7 @@ def test_sentences_speak_of_the_page_and_not_of_options(tmp_path):
         "If it looks the other way, say --side right, or of a sheet --figure right=N.",
         "By the colours it shows the character's left side. If it does, say --side left, or of a sheet --figure left=N.",
         "Paint the background in one colour, save the figure with a transparent one, or take --segmenter rembg.",
+        "--segmenter rembg: No module named 'rembg'. Install it: pip install 'charnerf[rembg]'.",
         "--refine 30 adapts the model to these drawings; it is kept only where it helps.",
         "--symmetric, if the character's left and right are alike, averages torn places out.",
         "--smooth 10 evens the surface out.",

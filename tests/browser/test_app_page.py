@@ -170,6 +170,19 @@ def test_three_drawings_to_a_character_that_is_taken_away(server, open_page, egg
     assert struct.unpack("<4sII", content[:12]) == (b"glTF", 2, len(content))
     assert opened.complaints == []
     assert [url for url in opened.requests if not url.startswith((server.address, "blob:"))] == []
+    with page.context.expect_page() as report:
+        page.get_by_role("link", name="Open the report").click()
+    check_report(report.value, page.evaluate("location.hash.slice(1)"))
+
+
+def check_report(report, session: str) -> None:
+    """It draws its mesh by its own script, and reaches neither the page that opened it nor a session."""
+    report.locator("charnerf-mesh canvas").wait_for()
+    assert report.evaluate("[origin, opener]") == ["null", None]
+    asked = (
+        "(session) => fetch(`/sessions/${session}/look?azimuth=0&elevation=0&size=64`).then(() => 1, () => 0)"
+    )
+    assert report.evaluate(asked, session) == 0
 
 
 def seen(page, other_than: str = "") -> str:

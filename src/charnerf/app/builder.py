@@ -2,7 +2,7 @@
 
 import io
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import final
@@ -13,7 +13,7 @@ from PIL import Image
 
 from charnerf.app.answers import Level, Product
 from charnerf.app.figures import Figure, in_order
-from charnerf.app.recognizer import given_drawings
+from charnerf.app.recognizer import given_drawings, reading_options
 from charnerf.app.settings import FORMATS, Plan
 from charnerf.errors import DependencyError
 from charnerf.inference.hero import Hero
@@ -47,7 +47,7 @@ class Builder:
             NumericalError: If the field is empty or not finite.
         """
         given = given_drawings(in_order(figures))
-        done = reconstruct(self.load(), folder, plan.options, given, reading=plan.reading)
+        done = reconstruct(self.load(), folder, plan.options, given, reading=reading_options(plan.reading))
         self.baked, self.turning = done.baked, done.baked.turning()
         levels, notes = _other_files(done, plan, folder)
         files = {
@@ -89,7 +89,7 @@ def _other_files(done: Reconstruction, plan: Plan, folder: Path) -> tuple[tuple[
         obj = folder / "obj"
         obj.mkdir()
         save_mesh(done.built.mesh, obj / "mesh.obj")
-        _zip(folder / "mesh_obj.zip", obj.iterdir())
+        _zip(folder / "mesh_obj.zip", {piece.name: piece for piece in sorted(obj.iterdir())})
         try:
             save_mesh(done.built.mesh, folder / "mesh.usdz")
         except DependencyError as error:
@@ -98,7 +98,8 @@ def _other_files(done: Reconstruction, plan: Plan, folder: Path) -> tuple[tuple[
         if plan.levels:
             progress.stage("levels")
             levels += _levels(done, plan, folder, progress.counter(len(plan.levels)))
-            _zip(folder / "levels.zip", (folder / level.file for level in levels))
+            lods = {f"mesh_LOD{number}.glb": folder / level.file for number, level in enumerate(levels)}
+            _zip(folder / "levels.zip", lods)
     return tuple(levels), tuple(notes)
 
 
@@ -120,8 +121,8 @@ def _levels(done: Reconstruction, plan: Plan, folder: Path, on_step: Callable[[]
     return levels
 
 
-def _zip(file: Path, pieces: Iterable[Path]) -> None:
-    """Write files into one archive."""
+def _zip(file: Path, pieces: Mapping[str, Path]) -> None:
+    """Write files into one archive, by the names that they get there."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for piece in sorted(pieces):
-            archive.write(piece, piece.name)
+        for name, piece in pieces.items():
+            archive.write(piece, name)

@@ -21,6 +21,13 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
+REPORT_HEADERS = {
+    # a page of its own origin, that of nobody: what a drawing's name may have smuggled into it reaches no session
+    "Content-Security-Policy": "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline';"
+    " style-src 'unsafe-inline'; img-src data: blob:; media-src data:; connect-src data: blob:; base-uri 'none';"
+    " form-action 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Opener-Policy": "unsafe-none",  # browsers refuse a sandboxed page that has another
+}
 
 
 def refusal(method: str, headers: Mapping[str, str], names: Collection[str]) -> str | None:

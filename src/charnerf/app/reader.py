@@ -12,8 +12,8 @@ from charnerf.app.background import Background
 from charnerf.app.figures import LEFT_OUT, Figure, in_order, view_text
 from charnerf.app.limits import Limits
 from charnerf.app.session import GivenPicture, Session, thumbnail_of
+from charnerf.app.settings import Reading
 from charnerf.app.worker import Ended, Refused, Worker
-from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.viewpoints import viewpoint
 from charnerf.errors import CharNeRFError, ConfigError, DataError
 
@@ -99,6 +99,7 @@ class Reader:
                 title=file.name,
                 thumbnail=thumbnail_of(file),
                 most_pixels=self.limits.pixels,
+                reading=session.reading,
             )
         except Refused as error:
             shutil.rmtree(file.parent, ignore_errors=True)
@@ -123,9 +124,7 @@ class Reader:
                 small.unlink(missing_ok=True)
         self.read(session)
 
-    def edit(
-        self, session: Session, changes: dict[int, tuple[str, bool]], reading: ReadingOptions | None
-    ) -> None:
+    def edit(self, session: Session, changes: dict[int, tuple[str, bool]], reading: Reading | None) -> None:
         """Name, leave out and mirror figures, or read all in another way.
 
         Args:
@@ -191,7 +190,7 @@ class Reader:
         figures, touched = session.figures, session.touched
         if {one.number for one in figures} <= session.named:
             return
-        named: list[Figure] = await self._ask("name", figures=figures)
+        named: list[Figure] = await self._ask("name", figures=figures, reading=session.reading)
         session.named |= {one.number for one in named}
         views = {one.number: one.view for one in session.figures if one.number in touched}
         for one in named:

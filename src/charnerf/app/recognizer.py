@@ -11,6 +11,7 @@ from PIL import Image
 
 from charnerf.app.answers import Found, Recognized, RecognizedView
 from charnerf.app.figures import Figure, in_order, view_by_name, view_text
+from charnerf.app.settings import Reading
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.find_doubts import LEAST_AGREEMENT
 from charnerf.drawings.load import Drawing, load_drawing
@@ -18,6 +19,7 @@ from charnerf.drawings.naming import MOST_NAMED, name_views
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.picture import CAPTION, PANEL
 from charnerf.drawings.read_sheet import canvases_to_name, named_view, square_views
+from charnerf.drawings.segmenters import segmenter_by_name
 from charnerf.drawings.sheet import Sheet, find_figures
 from charnerf.drawings.turnaround import Picture, Turnaround, read_views
 from charnerf.drawings.viewpoints import Viewpoint, viewpoint
@@ -44,7 +46,7 @@ class Recognizer:
         """Side of the model's pictures, pixels: the model can be loaded."""
         return self.size
 
-    def examine(self, file: Path, title: str, thumbnail: Path, most_pixels: int) -> Found:
+    def examine(self, file: Path, title: str, thumbnail: Path, most_pixels: int, reading: Reading) -> Found:
         """Find the figures of a picture, and write a small one of it and of each figure: N.png, N-0.png, N-1.png and so on.
 
         Raises:
@@ -55,7 +57,7 @@ class Recognizer:
         _save_small(drawing, thumbnail)
         sheet = _sheet(file)
         if sheet is None:
-            cut_out(drawing)  # says what is wrong with it now, not later
+            cut_out(drawing, reading_options(reading).segment)  # says what is wrong with it now, not later
             return Found(((0.0, 0.0, 1.0, 1.0),), False)
         for index, figure in enumerate(sheet.figures):
             _save_small(figure.drawing, thumbnail.with_stem(f"{thumbnail.stem}-{index}"))
@@ -63,13 +65,13 @@ class Recognizer:
         boxes = [one.box for one in sheet.figures]
         return Found(tuple((a / width, b / height, c / width, d / height) for a, b, c, d in boxes), True)
 
-    def name(self, figures: Sequence[Figure]) -> list[Figure]:
+    def name(self, figures: Sequence[Figure], reading: Reading) -> list[Figure]:
         """Say from where each figure is seen: by its file's name, else by how it looks beside the others.
 
         Raises:
             DataError: If one can not be cut out.
         """
-        canvases = canvases_to_name([_drawing(one) for one in figures])
+        canvases = canvases_to_name([_drawing(one) for one in figures], reading_options(reading).segment)
         told = [view_by_name(one.title) if one.part is None else None for one in figures]
         shown = {name: canvas for name, canvas in zip(told, canvases, strict=True) if name is not None}
         named = [
@@ -89,14 +91,14 @@ class Recognizer:
             taken.add(view)
         return [replace(one, view=view) for one, view in zip(figures, views, strict=True)]
 
-    def recognize(self, figures: Sequence[Figure], reading: ReadingOptions, folder: Path) -> Recognized:
+    def recognize(self, figures: Sequence[Figure], reading: Reading, folder: Path) -> Recognized:
         """Read the views as the model will, and write pictures of how they were cut out and reconciled.
 
         Raises:
             DataError: If they can not be used.
         """
         used = in_order(figures)
-        read = read_views(given_drawings(used), size=self.size, options=reading)
+        read = read_views(given_drawings(used), size=self.size, options=reading_options(reading))
         folder.mkdir(parents=True)
         shown = zip(  # a side that was guessed beside them comes last
             used, read.names, read.reconciliation.views, _panels(read, len(used), folder), strict=False
@@ -106,6 +108,18 @@ class Recognizer:
             for figure, name, agreement, (given, mended) in shown
         )
         return Recognized(views, read.assumptions, read.warnings)
+
+
+@lru_cache(maxsize=2)
+def reading_options(reading: Reading) -> ReadingOptions:
+    """How drawings are read, with what that needs: a network is loaded once.
+
+    Raises:
+        ConfigError: If the network is not on this machine.
+        DependencyError: If what runs it is missing.
+    """
+    segment = segmenter_by_name(reading.segmenter)
+    return ReadingOptions(reading.reconciled, reading.keep_ink, segment)
 
 
 def given_drawings(used: Sequence[Figure]) -> dict[Viewpoint, Picture]:

@@ -11,12 +11,11 @@ from typing import Any
 from aiohttp import web
 
 from charnerf.app.examples import EXAMPLES, example_files
-from charnerf.app.guard import HEADERS, refusal
+from charnerf.app.guard import HEADERS, REPORT_HEADERS, refusal
 from charnerf.app.session import Session, thumbnail_of
-from charnerf.app.settings import form, read_plan
+from charnerf.app.settings import Reading, form, read_plan
 from charnerf.app.studio import Studio
 from charnerf.app.worker import Refused
-from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.viewpoints import AZIMUTHS
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.viewer.element import viewer_script
@@ -259,7 +258,7 @@ async def _edit(request: web.Request) -> web.Response:
         )
     if reading is not None:
         reading = read_plan(reading).reading
-    read: ReadingOptions | None = reading
+    read: Reading | None = reading
     request.app[STUDIO].reader.edit(
         session, {_number(number): (one["view"], one["mirrored"]) for number, one in changes.items()}, read
     )
@@ -327,9 +326,9 @@ async def _made_file(request: web.Request) -> web.StreamResponse:
     product = session.product
     known = set() if product is None else {*product.files, *(level.file for level in product.levels)}
     file = _known(session.made_in, request.match_info["folder"], name, known)
-    return _file(
-        file, {"Content-Disposition": f'attachment; filename="{name}"'} if "save" in request.query else {}
-    )
+    if "save" in request.query:
+        return _file(file, {"Content-Disposition": f'attachment; filename="{name}"'})
+    return _file(file, REPORT_HEADERS if file.suffix == ".html" else {})
 
 
 def _known(folder: Path | None, folder_name: str, name: str, known: Collection[str]) -> Path:

@@ -7,10 +7,9 @@ from typing import Any
 
 from charnerf.app.answers import Found, Product, Recognized
 from charnerf.app.figures import Figure
-from charnerf.app.settings import Plan
+from charnerf.app.settings import Plan, Reading
 from charnerf.app.words import page_words
 from charnerf.app.worker import Worker
-from charnerf.drawings.options import ReadingOptions
 from charnerf.progress import Moment
 
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
@@ -98,7 +97,7 @@ class Session:
         self.named: set[int] = set()  # figures that have been named
         self.touched: set[int] = set()  # those of them that the user has named
         self.numbers = 0  # given so far, to pictures, figures and folders
-        self.reading = ReadingOptions()
+        self.reading = Reading()
         self.recognized: Recognized | None = None
         self.recognized_in: Path | None = None
         self.problem: str | None = None  # why the figures are no character yet

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 from charnerf.drawings.options import ReadingOptions
+from charnerf.drawings.segmenters import NETWORK, PAPER
 from charnerf.errors import ConfigError
 from charnerf.meshing.options import Texture
 from charnerf.reconstruction.options import LIGHT, ReconstructionOptions
@@ -14,6 +15,21 @@ from charnerf.reconstruction.progress import mesh_seconds, reconstruction_stages
 MOST_LEVELS = 6
 FORMATS = 2.0  # seconds
 DEFAULT = ReconstructionOptions()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How drawings are read: what crosses to the processes that read them.
+
+    Attributes:
+        reconciled: As of `ReadingOptions`.
+        keep_ink: As of `ReadingOptions`.
+        segmenter: Its name.
+    """
+
+    reconciled: bool = ReadingOptions.reconciled
+    keep_ink: bool = ReadingOptions.keep_ink
+    segmenter: str = PAPER
 
 
 @dataclass(frozen=True)
@@ -27,7 +43,7 @@ class Plan:
     """
 
     options: ReconstructionOptions
-    reading: ReadingOptions
+    reading: Reading
     levels: tuple[int, ...]
 
     @property
@@ -84,6 +100,8 @@ FIELDS = (
           0, "Field and pictures", 0, 600),
     Field("frames", "Turntable frames", "Pictures around the character.", "number", DEFAULT.frames, "Field and pictures", 1, 120),
     Field("size", "Picture size", "Pixels a side of turntable and views.", "number", DEFAULT.size, "Field and pictures", 64, 512),
+    Field("segmenter", "Background", "How figures without alpha are told from what lies behind them.", "choice", PAPER, "Drawings",
+          choices=((PAPER, "one plain colour"), (NETWORK, "a photo or scene: a network"))),
     Field("as_drawn", "As drawn", "Takes views as they are, also where they disagree.", "switch",
           not ReadingOptions.reconciled, "Drawings"),
     Field("keep_ink", "Keep ink", "Takes lines along outlines for paint.", "switch", ReadingOptions.keep_ink, "Drawings"),
@@ -121,7 +139,7 @@ def read_plan(values: Mapping[str, Any]) -> Plan:
         symmetric=read["symmetric"],
         refine_seconds=float(read["refine"]) if read["refine"] else None,
     )
-    reading = ReadingOptions(reconciled=not read["as_drawn"], keep_ink=read["keep_ink"])
+    reading = Reading(not read["as_drawn"], read["keep_ink"], read["segmenter"])
     return Plan(options, reading, levels)
 
 

@@ -5,7 +5,9 @@ from pathlib import Path
 
 _SAID = (  # what a command line says, and what the page does
     (r"(If it (?:looks the other way|does)), say --side (\w+), or of a sheet --figure \w+=N\.", r"\1, call it \2."),
-    (r", save the figure with a transparent one, or take --segmenter rembg\.", ", or save the figure with a transparent one."),
+    (r"or take --segmenter rembg\.", "or set Background to a network (Options, Drawings) and add it again."),
+    (r"--segmenter(?: rembg)?: ", "The network for backgrounds: "),
+    (r"Install it: pip", "Whoever runs this page can install it: pip"),
     (r"Give it alone, as `charnerf reconstruct SHEET -o DIR`, or crop", "Crop"),
     (r"--refine 30 adapts", "Refine (30 seconds) adapts"),
     (r"--symmetric,", "Symmetric,"),

@@ -9,6 +9,7 @@ import typer
 
 from charnerf.cli.messages import say
 from charnerf.drawings.options import ReadingOptions
+from charnerf.drawings.segmenters import segmenter_by_name
 from charnerf.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -82,14 +83,7 @@ def reading_options(
     *, as_drawn: AsDrawn = False, keep_ink: KeepInk = False, segmenter: Segmenter = "paper"
 ) -> ReadingOptions:
     """How drawings are read."""
-    name, _, model = segmenter.partition(":")
-    if name not in ("paper", "rembg") or (name == "paper" and model):
-        raise ConfigError(f"--segmenter: found '{segmenter[:60]}', expected paper, rembg or rembg:MODEL.")
-    segment = None
-    if name == "rembg":
-        from charnerf.drawings.network_mask import NetworkMask
-
-        segment = NetworkMask(model) if model else NetworkMask()
+    segment = segmenter_by_name(segmenter)
     return ReadingOptions(reconciled=not as_drawn, keep_ink=keep_ink, segment=segment)
 
 

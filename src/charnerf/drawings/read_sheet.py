@@ -13,6 +13,7 @@ from charnerf.drawings.align import on_one_scale
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.naming import MOST_NAMED, looks_left, name_views
+from charnerf.drawings.options import Segment
 from charnerf.drawings.sheet import Sheet, find_figures
 from charnerf.drawings.viewpoints import Viewpoint, between_square_ones, viewpoint
 from charnerf.errors import DataError
@@ -89,13 +90,14 @@ def read_sheet(
     )
 
 
-def canvases_to_name(drawings: Sequence[Drawing]) -> list[np.ndarray]:
+def canvases_to_name(drawings: Sequence[Drawing], segment: Segment | None = None) -> list[np.ndarray]:
     """Figures cut out and brought to one height, (CANVAS, CANVAS, 4) each, as `naming` wants them.
 
     Raises:
         DataError: If one can not be cut out.
     """
-    return on_one_scale([cut_out(one).rgba for one in drawings], [one.name for one in drawings], CANVAS)
+    cut = [cut_out(one, segment).rgba for one in drawings]
+    return on_one_scale(cut, [one.name for one in drawings], CANVAS)
 
 
 def _views(

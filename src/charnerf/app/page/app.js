@@ -403,6 +403,7 @@ function drawProduct() {
   showFilm(made, product);
   $("panel-sheet").replaceChildren(make("img", { src: made("sheet.png"), alt: "Model sheet: the drawings above, eight views of the character below" }));
   write($("quality"), product.quality);
+  $("report").href = made("report.html");
   drawList($("suggestions"), product.suggestions);
   $("again").hidden = !product.suggestions.some((one) => one.startsWith("Refine"));
   drawList($("notes"), product.notes);
