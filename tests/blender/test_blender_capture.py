@@ -102,6 +102,19 @@ def test_both_renderers_take_the_same_pictures(files):
         assert np.abs(one - other)[inside].max() <= 2.0
 
 
+def test_with_as_many_rays_colours_are_the_same_at_edges_too(files):
+    """Of every inner pixel, wherever colours meet in it; by few rays they are not."""
+    options = {"views": 1, "size": 48}
+    inner, pictures = np.ones((48, 48), bool), []
+    for renderer in (BuiltIn(subsamples=1024, edge_subsamples=1024), Blender(samples=1024), BuiltIn()):
+        surface = renderer.read(files / "glb.glb", None, None).surface
+        made = capture_character(surface, CaptureOptions(**options, renderer=renderer)).pictures
+        pictures.append(made.source_images[0].astype(int))
+        inner &= ndimage.binary_erosion(pictures[-1][..., 3] == 255, np.ones((3, 3)))
+    many, theirs, few = (one[inner][:, :3] for one in pictures)
+    assert len(many) > 100 and np.abs(many - theirs).max() <= 2 < np.abs(many - few).max()
+
+
 def test_depth_and_light_are_the_same(files, reference):
     options = {"views": 2, "size": 48, "depth": True, "light": Headlight()}
     ours = capture_character(reference, CaptureOptions(**options)).pictures
