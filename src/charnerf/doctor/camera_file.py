@@ -19,6 +19,7 @@ from charnerf.files import inside
 from charnerf.foreign.shot import picture_size
 
 _SQUARE_OFF = 1e-3  # of a rotation
+_FOCALS_APART = 0.01  # share by which two that are one may differ, as rounded
 
 
 @dataclass
@@ -48,6 +49,7 @@ def read_camera_file(folder: Path, path: Path) -> tuple[list[View], list[Finding
             f"{path}: frames: found {shown(frames)}, expected a list of 1 to {MOST_FRAMES} frames."
         )
     read = _Read(folder, path)
+    _compare_focals(read, content)
     for key, entry, is_source in _entries(content, frames):
         if isinstance(entry, dict):
             _add(read, key, entry if is_source else {**content, **entry}, is_source)
@@ -75,7 +77,7 @@ def _add(read: _Read, key: str, entry: Mapping[str, Any], is_source: bool) -> No
     centre = tuple(
         _finite(entry.get(name), 0.5 * side) for name, side in zip(("cx", "cy"), size, strict=True)
     )
-    mask = entry.get("mask_path")
+    mask, depth = entry.get("mask_path"), entry.get("depth_file_path")
     read.views.append(
         View(
             name=str(entry["file_path"])
@@ -90,6 +92,7 @@ def _add(read: _Read, key: str, entry: Mapping[str, Any], is_source: bool) -> No
             is_orthographic=entry.get("camera_model") == "ORTHOGRAPHIC",
             is_source=is_source,
             mask=_named(read.folder, mask, key) if isinstance(mask, str) else None,
+            depth=_named(read.folder, depth, key) if isinstance(depth, str) else None,
         )
     )
 
@@ -188,6 +191,20 @@ def _focal(read: _Read, key: str, entry: Mapping[str, Any], width: int) -> tuple
     return None
 
 
+def _compare_focals(read: _Read, content: Mapping[str, Any]) -> None:
+    """Note where the angle and the focal length that a file states for all are not one: programs read the one or the other."""
+    angle, focal, width = (_finite(content.get(key), math.nan) for key in ("camera_angle_x", "fl_x", "w"))
+    if not (focal > 0.0 and width > 0.0 and angle > 0.0):
+        return
+    if angle >= math.pi:
+        read.note("degrees for radians", "camera_angle_x", f"{angle:g}")
+        return
+    by_angle = 0.5 * width / math.tan(0.5 * angle)
+    if abs(by_angle / focal - 1.0) > _FOCALS_APART:
+        found = f"{angle:.4g}, by which fl_x is {by_angle:.4g}, beside fl_x {focal:.4g}"
+        read.note("contradicting focal lengths", "camera_angle_x", found)
+
+
 def _finite(value: Any, default: float) -> float:
     if value is None:
         return default
@@ -211,6 +228,10 @@ _EXPECTED = {
     "scaled axes": (
         "columns of length 1",
         "Divide the columns by their lengths: a scaled object was exported as a camera.",
+    ),
+    "contradicting focal lengths": (
+        "one field of view",
+        "Leave out the wrong one of camera_angle_x and fl_x.",
     ),
     "degrees for radians": ("radians between 0 and pi", "Divide by 180 and multiply by pi."),
 }

@@ -1,6 +1,6 @@
 """A data set's characters examined, one by one: files, figures, cameras, mesh."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,10 +12,11 @@ from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import DEPTH_FOLDER
 from charnerf.data.layout import DATASET_FILE, MESH_FILE, TRANSFORMS_FILE, read_dataset
 from charnerf.doctor.camera_file import read_camera_file
+from charnerf.doctor.depth import depth_findings
 from charnerf.doctor.figure import figure_alpha, figure_findings
 from charnerf.doctor.finding import Finding
 from charnerf.doctor.geometry import geometry_findings
-from charnerf.doctor.picture_files import depth_findings, duplicates, picture_findings
+from charnerf.doctor.picture_files import DEPTH_AGAIN, depth_file_findings, duplicates, picture_findings
 from charnerf.doctor.seen import seen
 from charnerf.doctor.surface import mesh_findings
 from charnerf.doctor.views import Patient, View
@@ -45,24 +46,37 @@ def dataset_findings(
     Raises:
         DataError: If it is no data set at all.
     """
+    told: list[Finding] = []
     if is_ours(root):
         try:
             splits = read_dataset(root).splits
         except DataError as error:
             where = str(root / DATASET_FILE)
             return [Finding("broken list", where, str(error), "a list of splits", "Write it again.")]
+        told += _split_findings(root, splits)
         names = list(dict.fromkeys(name for members in splits.values() for name in members))
         patients = [partial(_of_ours, root, name) for name in names]
     else:
         form, found = recognised(root)
         patients = [partial(_of_foreign, form, one) for one in found]
     examined = counter(len(patients))
-    told: list[Finding] = []
     with in_processes(_examine, patients, processes) as results:
         for _, findings in results:
             examined()
             told += findings
     return told
+
+
+def _split_findings(root: Path, splits: Mapping[str, Sequence[str]]) -> Iterator[Finding]:
+    """Characters that are trained on and measured on."""
+    for measured in ("val", "test"):
+        both = sorted(set(splits.get("train", ())) & set(splits.get(measured, ())))
+        if both:
+            more = f", and {len(both) - 1} more" if len(both) > 1 else ""
+            yield Finding(
+                "character in two splits", str(root / DATASET_FILE), f"{both[0]}{more} in train and in {measured}",
+                "characters to measure on that are not trained on", "Take them out of one of the two.",
+            )  # fmt: skip
 
 
 def _examine(admit: Callable[[], Patient]) -> list[Finding]:
@@ -90,7 +104,12 @@ def _examine(admit: Callable[[], Patient]) -> list[Finding]:
         return _told([*findings, *mesh_findings(patient, None)])
     views, pictures, alphas = ([every[place] for place in kept] for every in (views, pictures, alphas))  # type: ignore[assignment]
     wrong, agreeing = geometry_findings(patient, seen(views, pictures, alphas))
-    return _told([*findings, *wrong, *mesh_findings(patient, agreeing)])
+    findings += [*wrong, *mesh_findings(patient, agreeing)]
+    told = {one.where for one in findings}  # whose pictures or cameras are wrong, whatever their depth is
+    right = [place for place, view in enumerate(views) if not told & {str(view.file), view.key}]
+    views, alphas = ([every[place] for place in right] for every in (views, alphas))  # type: ignore[assignment]
+    are_right = patient.in_our_frame and not findings
+    return _told([*findings, *depth_findings(views, alphas, are_right=are_right)])
 
 
 def _examined_view(view: View) -> tuple[np.ndarray | None, np.ndarray | None, list[Finding]]:
@@ -152,7 +171,12 @@ def _of_ours(root: Path, name: str) -> Patient:
         return Patient(name, folder, None, (), (wrong,))
     views, findings = _read(folder, [path])
     for file in sorted((folder / DEPTH_FOLDER).glob("*.png")):
-        findings += depth_findings(file)
+        findings += depth_file_findings(file)
+    lost = [view.depth for view in views if view.depth is not None and not view.depth.is_file()]
+    if lost:
+        more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
+        found, expected = f"no {lost[0]}{more}", "every depth picture that it names"
+        findings.append(Finding("missing file", str(path), found, expected, "Capture it again.", DEPTH_AGAIN))
     if views and not any(view.is_source for view in views):
         fix = "Capture the character again, or read it as a foreign set."
         findings.append(Finding("missing entry", f"{path}: source_views", "none", "front, side or back", fix))

@@ -21,7 +21,7 @@ from charnerf.types import Cameras
 COVERED = 0.99  # of every silhouette, where cameras are right
 MOST_CARVING = 24
 SLACK = 1  # pixel, beside a cell of the grid
-FILLED = 0.97  # of what lies well inside the hull, by a right mask
+FILLED = 0.95  # of what lies well inside the hull, by a right mask: without it the hull is larger
 
 
 @dataclass(frozen=True)

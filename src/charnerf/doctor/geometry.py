@@ -1,6 +1,7 @@
 """Cameras against silhouettes: who disagrees, and what would bring agreement."""
 
 from collections.abc import Callable, Iterator
+from statistics import median
 
 import numpy as np
 import torch
@@ -139,14 +140,14 @@ def _of_view(sight: Seen, view: int, hull: Consensus, blamed: list[int], cut: fl
             all_of_it, "Flip the picture.", mirror_command(one.file), picture,
         )  # fmt: skip
         return
-    own, expected = _box(mask), _projected_box(sight.cameras[view : view + 1], hull)
-    ratio = float((own[3] - own[1]) / (expected[3] - expected[1]))
+    ratio = _tallness(sight, view, hull) / _usual_tallness(sight, view, hull, blamed)
     if abs(ratio - 1.0) > OFF_SCALE:
         yield Finding(
             "different scale", str(one.file), f"a figure {ratio:.2f} times as tall as the other views say; {evidence}",
             "1.00 times", f"Scale the picture by {1.0 / ratio:.3f}, or multiply its fl_x and fl_y by {ratio:.3f}.", picture=picture,
         )  # fmt: skip
         return
+    own, expected = _box(mask), _projected_box(sight.cameras[view : view + 1], hull)
     middle = 0.5 * (own[:2] + own[2:] - expected[:2] - expected[2:])
     angle = float(torch.rad2deg(torch.atan(middle.norm() / sight.cameras.focal[view].mean())))
     amount = "" if one.is_orthographic else f" ({angle:.1f} degrees)"
@@ -189,6 +190,20 @@ def _frame_findings(patient: Patient, sight: Seen, hull: Consensus) -> Iterator[
 def _some(sight: Seen, index: Tensor) -> Seen:
     views = tuple(sight.views[one] for one in index.tolist())
     return Seen(views, sight.cameras[index], sight.alphas[index], sight.rgb[index.numpy()])
+
+
+def _tallness(sight: Seen, view: int, hull: Consensus) -> float:
+    """Height of a view's figure over that of the hull, which is taller than the figure by some cells."""
+    own = _box(sight.alphas[view] > INSIDE)
+    expected = _projected_box(sight.cameras[view : view + 1], hull)
+    return float((own[3] - own[1]) / (expected[3] - expected[1]))
+
+
+def _usual_tallness(sight: Seen, view: int, hull: Consensus, blamed: list[int]) -> float:
+    """The same of the views that agree, of its kind if there are any, in the median."""
+    right = [one for one in range(len(sight.views)) if one not in blamed]
+    alike = [one for one in right if sight.views[one].is_orthographic == sight.views[view].is_orthographic]
+    return median(_tallness(sight, one, hull) for one in alike or right)
 
 
 def _box(mask: Tensor) -> Tensor:

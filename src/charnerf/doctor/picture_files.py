@@ -17,6 +17,7 @@ from charnerf.pictures import open_picture
 SRGB_GAMMA = 0.45455
 _PNG = b"\x89PNG\r\n\x1a\n"
 _EIGHT_BIT = ("RGB", "RGBA", "L", "LA", "P", "PA")
+DEPTH_AGAIN = "charnerf capture MESH -o DATASET --split SPLIT --depth"
 _DEPTH = ("I;16", "I;16B", "I")
 
 
@@ -52,11 +53,12 @@ def picture_findings(file: Path, size: tuple[int, int]) -> tuple[np.ndarray | No
         return None, [Finding("truncated file", str(file), found, "a picture that opens whole", fix)]
 
 
-def depth_findings(file: Path) -> list[Finding]:
+def depth_file_findings(file: Path) -> list[Finding]:
     """What is wrong with a depth picture's file."""
     try:
         with open_picture(file) as picture:
             mode = picture.mode
+            picture.load()
     except (OSError, SyntaxError, ValueError) as error:
         return [
             Finding(
@@ -69,7 +71,6 @@ def depth_findings(file: Path) -> list[Finding]:
         ]
     if mode in _DEPTH:
         return []
-    command = "charnerf capture MESH -o DATASET --split SPLIT --depth"
     return [
         Finding(
             "wrong bit depth",
@@ -77,7 +78,7 @@ def depth_findings(file: Path) -> list[Finding]:
             f"mode {mode}",
             "16-bit grey, millimetres",
             "Capture it again.",
-            command,
+            DEPTH_AGAIN,
         )
     ]
 

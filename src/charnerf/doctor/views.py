@@ -25,6 +25,7 @@ class View:
         is_orthographic: Whether its rays are parallel.
         is_source: Whether it is a source view.
         mask: Picture that shows where the figure is, or None.
+        depth: Its depth picture, or None.
     """
 
     name: str
@@ -37,6 +38,7 @@ class View:
     is_orthographic: bool = False
     is_source: bool = False
     mask: Path | None = None
+    depth: Path | None = None
 
 
 @dataclass(frozen=True)
