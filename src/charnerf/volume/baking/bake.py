@@ -25,6 +25,7 @@ from charnerf.volume.baking.grid import (
     OPAQUE_U,
     SCALE,
     BakedGrid,
+    between,
     combined,
     cut_densities,
     interpolated,
@@ -188,7 +189,11 @@ class _Coarse:
         refined = holding & any_corner(densities > THIN_SHARE * tolerance / lattice.pitch)
         errors, step = _expected_errors(u, kept), lattice.pitch / factor
         bent = any_corner(errors * step * torch.exp(-densities * step) > STRAIGHT_SHARE * tolerance) & refined
-        return cls(lattice, u, kept, dark, errors, holding, refined, bent, len(points))
+        looked_into = holding & ~bent if factor > 1 else torch.zeros_like(holding)
+        missed = _missed_opacities(scene, lattice, u, kept, looked_into, step)
+        bent[looked_into] = missed > STRAIGHT_SHARE * tolerance
+        num_evaluated = len(points) + len(missed)
+        return cls(lattice, u, kept, dark, errors, holding, refined | bent, bent, num_evaluated)
 
     @property
     def densities(self) -> Tensor:
@@ -245,6 +250,17 @@ def _expected_errors(u: Tensor, kept: Tensor) -> Tensor:
     return curve / 8.0 * SCALE * torch.sigmoid(u) * kept.clamp_max(1.0)
 
 
+def _missed_opacities(
+    scene: Scene, lattice: Lattice, u: Tensor, kept: Tensor, cells: Tensor, step: float
+) -> Tensor:
+    """Errors of a step's opacity in the middles of cells (N,) by what the lattice's points (X, Y, Z) say: they may hide ridges."""
+    middles = cells.nonzero() + 0.5
+    us, shares = _asked(scene, lattice.points(middles), lambda number: None)
+    read = between((u, kept), middles.t())
+    passed, by_lattice = (torch.exp(-step * cut_densities(*one)) for one in ((us, shares), read))
+    return (passed - by_lattice).abs()
+
+
 @dataclass(frozen=True)
 class _Fine:
     """The fine grid: which of its points are in cells that hold something; u, shares kept and errors, 1/m, of all, (X, Y, Z)."""
@@ -269,9 +285,9 @@ class _Fine:
         rows = torch.stack([one.reshape(-1) for one in (coarse.u, coarse.kept, coarse.errors)], dim=-1)
         numbers = torch.arange(len(rows), dtype=torch.int32, device=index.device).view(lattice.shape)
         filled = interpolated(numbers, rows, places.to(rows.dtype) / factor)
-        between = (places % factor != 0).any(-1)
-        filled[~between, 2] = 0.0
-        new = finer_points(coarse.bent, factor)[used] & between
+        added = (places % factor != 0).any(-1)
+        filled[~added, 2] = 0.0
+        new = finer_points(coarse.bent, factor)[used] & added
         us, shares = _asked(scene, lattice.points(places[new], factor), on_points)
         off = (cut_densities(us, shares) - cut_densities(filled[new, 0], filled[new, 1])).abs()
         filled[new] = torch.stack((us, shares, off / factor**2), dim=-1)

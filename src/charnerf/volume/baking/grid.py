@@ -101,22 +101,18 @@ class BakedGrid(MovableRecord):
 def between(volumes: tuple[Tensor, ...], at: Tensor) -> list[Tensor]:
     """Values (P,) of volumes (X, Y, Z) at places (3, P) counted in their steps, in the places' precision.
 
-    Corner by corner for all places: half the time of `interpolated`, for volumes whose points all have a value.
+    Half the time of `interpolated`, for volumes whose points all have a value.
     """
     _, size_y, size_z = volumes[0].shape
     low = torch.minimum(at.floor().clamp_min_(0.0), at.new_tensor(volumes[0].shape)[:, None] - 2.0)
-    second = at - low
     x, y, z = low.int()
-    corner, first = (x * size_y + y).mul_(size_z).add_(z), 1.0 - second
-    flat, totals = [one.reshape(-1) for one in volumes], [at.new_zeros(at.shape[1]) for _ in volumes]
-    for a, near_x in enumerate((first[0], second[0])):
-        for b, near_y in enumerate((first[1], second[1])):
-            near = near_x * near_y
-            for c, near_z in enumerate((first[2], second[2])):
-                weight, here = near * near_z, corner + ((a * size_y + b) * size_z + c)
-                for values, total in zip(flat, totals, strict=True):
-                    total.addcmul_(values.index_select(0, here).to(at.dtype), weight)
-    return totals
+    corner, second = (x * size_y + y).mul_(size_z).add_(z), at - low
+    steps = [(a * size_y + b) * size_z + c for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+    around = (corner + corner.new_tensor(steps)[:, None]).view(-1)
+    near_x, near_y, near_z = torch.stack((1.0 - second, second), dim=1)
+    weights = (near_x[:, None, None] * (near_y[:, None] * near_z)).view(len(steps), -1)
+    read = (one.reshape(-1).index_select(0, around).view(weights.shape) for one in volumes)
+    return [(values * weights).sum(0) for values in read]
 
 
 def interpolated(index: Tensor, rows: Tensor, at: Tensor) -> Tensor:
