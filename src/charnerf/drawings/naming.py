@@ -32,6 +32,7 @@ LAYOUT_WEIGHT = 0.1
 FIRST_WEIGHT = 0.25  # of a front that stands before the back
 HALVES_WEIGHT = 4.0
 LOOKS_WEIGHT = 0.1  # of feet and face: they trail in a stride or under a robe, colours do not
+AHEAD_WEIGHT = 0.3  # of feet and face that look to the half with the front's colours
 CLEAR_HALVES = 0.02  # agreement of halves beyond which colours alone say where a profile looks
 HEAD_WEIGHT = 4.0  # of rows that show the head: a face tells front from back, clothes often do not
 
@@ -42,7 +43,7 @@ class Naming:
 
     Attributes:
         viewpoints: By figure, in the order given.
-        is_doubtful: Whether another naming is nearly as good.
+        is_doubtful: Whether another naming is nearly as good, or better but for where the figures stand.
         reasons: What spoke for it, sentences.
     """
 
@@ -75,16 +76,16 @@ def name_views(canvases: Sequence[np.ndarray]) -> Naming:
     for roles in TURNS[len(canvases)]:
         for order in permutations(range(len(canvases))):
             by_role = {role: order[place] for place, role in enumerate(roles)}
-            scored.append(
-                (_score(by_role, canvases, looks) - 0.15 * TURNS[len(canvases)].index(roles), by_role)
-            )
+            likeness = _score(by_role, canvases, looks) - 0.15 * TURNS[len(canvases)].index(roles)
+            scored.append((likeness + _layout(by_role), by_role, likeness))
     scored.sort(key=lambda one: -one[0])
     best = scored[0][1]
+    by_likeness = max(scored, key=lambda one: one[2])[1]
     figures = {index: role for role, index in best.items()}
     viewpoints = tuple(_viewpoint(figures[index], best, canvases, looks) for index in range(len(canvases)))
     others = [
         score
-        for score, by_role in scored
+        for score, by_role, _ in scored
         if by_role.get("front") != best["front"] or set(by_role) != set(best)
     ]
     lead = scored[0][0] - max(others, default=-np.inf)
@@ -92,7 +93,7 @@ def name_views(canvases: Sequence[np.ndarray]) -> Naming:
         f"heads: {', '.join(f'{one.face:.2f}' for one in looks)} (a face shows more)",
         f"symmetry: {', '.join(f'{one.symmetry:.2f}' for one in looks)}",
     )
-    return Naming(viewpoints, bool(lead < DOUBTFUL), reasons)
+    return Naming(viewpoints, bool(lead < DOUBTFUL) or by_likeness != best, reasons)
 
 
 def looks_left(side: np.ndarray, front: np.ndarray | None = None, back: np.ndarray | None = None) -> bool:
@@ -154,16 +155,23 @@ def _score(roles: dict[str, int], canvases: Sequence[np.ndarray], looks: Sequenc
         back = roles["back"]
         score += 2.0 * iou(canvases[front][:, ::-1, 3], canvases[back][..., 3])
         score += looks[back].symmetry - 0.5 * _standing(looks, back, "face")
-        score += FIRST_WEIGHT * (front < back)
         if "side" in roles:
             side = roles["side"]
             score += abs(_turn(canvases[side], canvases[front], canvases[back], looks[side]))
+            ahead = -_halves(canvases[front], canvases[back], canvases[side]) / CLEAR_HALVES
+            score += AHEAD_WEIGHT * looks[side].direction * float(np.clip(ahead, -1.0, 1.0))
     for role in ("side", "other side"):
         if role in roles:
             score += 1.0 - looks[roles[role]].symmetry + (1.0 - _standing(looks, roles[role], "width"))
+    return score
+
+
+def _layout(roles: dict[str, int]) -> float:
+    """How well the figures stand as artists place them: as one turns, the front first."""
     places = [index for _, index in sorted(roles.items(), key=lambda pair: _TURN[pair[0]])]
     steps = sum(later > earlier for earlier, later in pairwise(places))
-    return score + LAYOUT_WEIGHT * (steps / max(1, len(places) - 1) + (front == 0))
+    in_turn = LAYOUT_WEIGHT * (steps / max(1, len(places) - 1) + (roles["front"] == 0))
+    return in_turn + FIRST_WEIGHT * ("back" in roles and roles["front"] < roles["back"])
 
 
 _TURN = {"front": 0, "three-quarter": 1, "side": 2, "three-quarter back": 3, "back": 4, "other side": 5}
