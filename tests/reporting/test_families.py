@@ -74,6 +74,15 @@ def test_each_table_is_compared_in_itself_and_row_by_row_with_the_other(twice):
     assert "charnerf loss=opacity is undecided against pixelnerf loss=opacity" in verdicts[1]
 
 
+def test_a_run_without_the_group_of_experiments_has_a_row():
+    """`python train.py ~experiment` is a config as any other."""
+    rows = group_rows([run("~experiment", "loss=charnerf"), run("experiment=charnerf")])
+    assert [(row.label, row.experiment) for row in rows] == [
+        ("loss=charnerf", None),
+        ("charnerf", "charnerf"),
+    ]
+
+
 def test_a_search_is_labelled_by_what_differs_and_best_first(search):
     labels = [row.label for row in sorted_rows(search)]
     assert set(labels[:2]) == {"num_heads=16 residual=true", "num_heads=16 residual=false"}

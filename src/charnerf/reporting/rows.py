@@ -69,7 +69,7 @@ def group_rows(runs: Sequence[Run]) -> list[Row]:
         for label, group in zip(labels, members, strict=True)
     ]
     return [
-        Row(label, _experiment(group[0]), tuple(group), variant)
+        Row(label, _experiment(group[0].overrides), tuple(group), variant)
         for label, group, variant in zip(labels, members, variants, strict=True)
     ]
 
@@ -94,16 +94,19 @@ def _without_seed(run: Run) -> str:
     return json.dumps(kept, sort_keys=True, default=str)
 
 
-def _experiment(run: Run) -> str | None:
-    chosen = [one.split("=", 1)[1] for one in run.overrides if one.split("=", 1)[0] == EXPERIMENT]
-    return chosen[0] if chosen else None
+def _experiment(overrides: Sequence[str]) -> str | None:
+    """The one that they choose, None where they choose none, or leave the group out (`~experiment`)."""
+    return next(
+        (one.removeprefix(f"{EXPERIMENT}=") for one in overrides if one.startswith(f"{EXPERIMENT}=")), None
+    )
 
 
 def _label(run: Run, own: Sequence[str], variant: str) -> str:
     """What a run's command line says that not all of them say."""
-    chosen = [one.split("=", 1)[1] for one in own if _key(one) == EXPERIMENT]
-    words = " ".join([*chosen, variant]).strip()
-    return words or _experiment(run) or (str(run.config["name"]) if "name" in run.config else run.name)
+    words = " ".join([_experiment(own) or "", variant]).strip()
+    return (
+        words or _experiment(run.overrides) or (str(run.config["name"]) if "name" in run.config else run.name)
+    )
 
 
 def _key(override: str) -> str:
