@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import torch
 import trimesh
+from torch import Tensor
 
 from charnerf.data.characters import Character
 from charnerf.evaluation.angles import Record, mean_of
 from charnerf.evaluation.baselines import VisualHullBaseline
+from charnerf.evaluation.metrics import psnr_foreground, silhouette_iou
 from charnerf.evaluation.surface_error import surface_scores, true_points
 from charnerf.markdown import table
 from charnerf.meshing.build import find_surface, finish_mesh
@@ -51,8 +52,8 @@ def score_meshes(scene: Scene, character: Character, options: MeshOptions) -> di
     sources = character.sources
     indices = list(range(0, len(character.image_files), -(-len(character.image_files) // NOVEL_VIEWS)))
     true_views = {
-        "source": (sources.cameras[0].to("cpu"), sources.images[0].cpu().movedim(1, -1).numpy()),
-        "novel": (character.cameras[indices], character.images(indices).numpy() / 255.0),
+        "source": (sources.cameras[0].to("cpu"), sources.images[0].cpu().movedim(1, -1)),
+        "novel": (character.cameras[indices], character.images(indices) / 255.0),
     }
     surface = find_surface(scene, sources, options)
     result: dict[str, Any] = {"surface_seconds": surface.seconds, "level": surface.extraction.level}
@@ -63,13 +64,13 @@ def score_meshes(scene: Scene, character: Character, options: MeshOptions) -> di
         if built.textured is not None and kind == "drawings":
             result["texels_from_field"] = built.textured.num_from_field / max(built.textured.num_texels, 1)
         for name, (cameras, images) in true_views.items():
-            scores = _picture_scores(built.mesh, cameras, images)
+            scores = picture_scores(built.mesh, cameras, images)
             result |= {f"{kind}_{name}_{key}": value for key, value in scores.items()}
     result |= {"iou": result["vertex_novel_iou"], **_surface_scores(surface.extraction.mesh, character)}
     hull = VisualHullBaseline(sources).mesh
     if hull is not None:
         result |= {f"hull_{key}": value for key, value in _surface_scores(hull, character).items()}
-        result["hull_iou"] = _picture_scores(hull, *true_views["novel"])["iou"]
+        result["hull_iou"] = picture_scores(hull, *true_views["novel"])["iou"]
     return result
 
 
@@ -79,24 +80,23 @@ def _surface_scores(mesh: trimesh.Trimesh, character: Character) -> dict[str, fl
     return surface_scores(mesh, true_points(character.mesh_file), character.cameras)[0]
 
 
-def _picture_scores(mesh: trimesh.Trimesh, cameras: Cameras, truth: np.ndarray) -> dict[str, float]:
-    """Mean over views (N, H, W, 4) of texture PSNR, foreground PSNR and silhouette IoU."""
+def picture_scores(mesh: trimesh.Trimesh, cameras: Cameras, truth: Tensor) -> dict[str, float | None]:
+    """Texture PSNR, foreground PSNR, dB, and silhouette IoU against true pictures (N, H, W, 4), RGBA in [0, 1], straight alpha.
+
+    Means over the views that have a figure: of texture there is none where mesh and character share no whole pixel.
+    """
     rows = []
-    for predicted, true in zip(render_mesh(mesh, cameras), truth, strict=True):
-        both = (predicted[..., 3] > WHOLE) & (true[..., 3] > WHOLE)
-        inside = true[..., 3] > 0.5
-        squared = (predicted[..., :3] - true[..., :3]) ** 2
-        squared_on_white = (on_white(predicted) - on_white(true)) ** 2
-        hit = predicted[..., 3] > 0.5
-        union = (hit | inside).sum()
-        iou = (hit & inside).sum() / union if union else 1.0
-        rows.append((_decibels(squared[both]), _decibels(squared_on_white[inside]), float(iou)))
-    means = np.nanmean(np.array(rows, np.float64), axis=0)
-    return dict(zip(("texture_psnr", "psnr_foreground", "iou"), map(float, means), strict=True))
-
-
-def _decibels(squared: np.ndarray) -> float:
-    return float(-10.0 * np.log10(max(float(squared.mean()), 1e-10))) if squared.size else float("nan")
+    for picture, true in zip(render_mesh(mesh, cameras), truth, strict=True):
+        predicted = torch.from_numpy(picture)
+        shared = (torch.minimum(predicted[..., 3], true[..., 3]) > WHOLE).float()
+        rows.append(
+            {
+                "texture_psnr": psnr_foreground(predicted[..., :3], true[..., :3], shared),
+                "psnr_foreground": psnr_foreground(on_white(predicted), on_white(true), true[..., 3]),
+                "iou": silhouette_iou(predicted[..., 3], true[..., 3]),
+            }
+        )
+    return mean_of(rows, ("texture_psnr", "psnr_foreground", "iou"))
 
 
 def score_table(rows: Mapping[str, Record]) -> list[str]:
