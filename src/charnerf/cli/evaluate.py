@@ -1,6 +1,7 @@
 """`charnerf evaluate`: a model measured on a split."""
 
 import json
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -16,7 +17,7 @@ from charnerf.cli.options import Device, SplitName, Trusted, Weights, gathered, 
 from charnerf.cli.summary import STDOUT, Summary, check_json, close
 from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import check_folder
+from charnerf.files import check_folder, read_text
 from charnerf.meshing.options import MeshOptions
 from charnerf.wording import counted
 
@@ -138,7 +139,7 @@ def command(
         mesh=partial(build_mesh, options=options) if mesh else None,
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
-        train_seconds=_train_seconds(run),
+        train_seconds=noted_seconds(run),
         redrawn=source_drawer(model.image_size),
     )
     _write(metrics, output, json_file, began)
@@ -224,14 +225,15 @@ def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:
     return "all" if views is None else views, resolution
 
 
-def _train_seconds(run: Path | None) -> float | None:
-    """Training time that a run noted, None where there is none."""
+def noted_seconds(run: Path | None) -> float | None:
+    """Training time that a run noted, seconds; None where it noted none, or something else than a number."""
     if run is None:
         return None
     try:
-        return json.loads((run / "metrics.json").read_text(encoding="utf-8"))["seconds"]["train"]
-    except (OSError, ValueError, KeyError, TypeError):
+        seconds = json.loads(read_text(run / "metrics.json"))["seconds"]["train"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
+    return seconds if type(seconds) in (int, float) and math.isfinite(seconds) else None
 
 
 def split_of(text: str) -> tuple[Path, str]:
