@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.files import locked, write_aside, write_bytes, write_folder_aside, write_text
+from charnerf.files import cache_folder, locked, write_aside, write_bytes, write_folder_aside, write_text
 
 
 def test_the_old_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
@@ -89,3 +89,12 @@ def test_a_lock_keeps_another_process_out_until_it_is_given_up(tmp_path: Path, n
     with locked(path):
         assert not is_free()
     assert is_free()
+
+
+def test_a_cache_lies_where_it_is_given_else_in_the_users(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", "/home/me")
+    assert cache_folder("~/big") == Path("/home/me/big") and cache_folder("there") == Path("there")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    assert cache_folder() == Path("/home/me/.cache/charnerf")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/fast")
+    assert cache_folder(None) == Path("/fast/charnerf")

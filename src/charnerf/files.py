@@ -92,8 +92,10 @@ def inside(folder: Path, name: str, where: str) -> Path:
     )
 
 
-def user_cache() -> Path:
-    """Charnerf's folder in the user's cache: $XDG_CACHE_HOME or ~/.cache."""
+def cache_folder(given: str | Path | None = None) -> Path:
+    """The folder for what can be made again: a given one, its ~ expanded, else charnerf's in $XDG_CACHE_HOME or ~/.cache."""
+    if given is not None:
+        return Path(given).expanduser()
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "charnerf"
 

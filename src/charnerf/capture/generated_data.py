@@ -11,7 +11,7 @@ from charnerf.capture.generated import Generator, check_numbers, generate_datase
 from charnerf.data.base import AbstractData
 from charnerf.data.layout import DATASET_FILE, read_dataset
 from charnerf.errors import ConfigError
-from charnerf.files import user_cache
+from charnerf.files import cache_folder
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ class AbstractGeneratedData(AbstractData):
         name, version = generator.name, generator.version
         facts: dict[str, Any] = {**settings, **generator.facts, "generator_version": version}
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:12]
-        return (Path(self.cache).expanduser() if self.cache else user_cache()) / f"{name}-v{version}-{digest}"
+        return cache_folder(self.cache) / f"{name}-v{version}-{digest}"
 
     def check_image_size(self, size: int) -> None:
         """Check the size that characters are generated in, and that the generator has what it needs."""

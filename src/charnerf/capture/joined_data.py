@@ -15,7 +15,7 @@ from charnerf.data.base import AbstractData
 from charnerf.data.folder import FolderData
 from charnerf.data.layout import DatasetInfo, read_dataset, write_dataset
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import locked, user_cache
+from charnerf.files import cache_folder, locked
 
 JOINED_SPLIT = "train"  # that generated characters join
 
@@ -70,7 +70,7 @@ class JoinedData(AbstractData):
             for name, count in counts.items()
             if count
         }
-        self._cache = Path(cache).expanduser() if cache is not None else user_cache()
+        self._cache = cache_folder(cache)
 
     def check_image_size(self, size: int) -> None:
         """Check those of the data set's first character and of all that is generated."""

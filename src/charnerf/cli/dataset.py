@@ -57,7 +57,7 @@ class GivenDataset:
             DataError: If it can not be read.
         """
         from charnerf.data.shards import CACHE_MIB, INDEX_FILE, open_cache
-        from charnerf.files import user_cache
+        from charnerf.files import cache_folder
         from charnerf.foreign.kept import is_ours, kept_copy
         from charnerf.foreign.reading import Reading
 
@@ -69,7 +69,7 @@ class GivenDataset:
                 f"--front, --side, --back, --keep-frame, --pixels: {self.folder} is a data set of charnerf, which says its own"
                 " views, expected them with foreign ones alone. Leave them out."
             )
-        return open_cache(str(self.folder), user_cache(), CACHE_MIB) if is_packed else self.folder
+        return open_cache(str(self.folder), cache_folder(), CACHE_MIB) if is_packed else self.folder
 
 
 def dataset_options(

@@ -8,7 +8,7 @@ from charnerf.data.base import AbstractData
 from charnerf.data.characters import load_character
 from charnerf.data.shards import open_cache, read_index_once
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import user_cache
+from charnerf.files import cache_folder
 
 
 @final
@@ -25,7 +25,7 @@ class ShardsData(AbstractData):
         if not cache_mib > 0.0:
             raise ConfigError(f"data.cache_mib: found {cache_mib}, expected more than 0.")
         self.address, self.cache_mib = root, cache_mib
-        self.cache = Path(cache).expanduser() if cache is not None else user_cache()
+        self.cache = cache_folder(cache)
 
     @cached_property
     def _folder(self) -> Path:

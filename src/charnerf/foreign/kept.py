@@ -11,7 +11,7 @@ from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import remove_partial_characters, write_character
 from charnerf.data.layout import DATASET_FILE, DatasetInfo, write_dataset
 from charnerf.errors import CharNeRFError, DataError
-from charnerf.files import locked, user_cache, write_text
+from charnerf.files import cache_folder, locked, write_text
 from charnerf.foreign.base import AbstractFormat, Found
 from charnerf.foreign.co3d import Co3d
 from charnerf.foreign.convert import converted
@@ -75,7 +75,7 @@ def kept_copy(
         DataError: If it is of no format, or characters can not be read: all of them are named, the others are kept.
     """
     form, found = recognised(root)
-    home = (cache or user_cache()) / _folder_name(root, reading)
+    home = cache_folder(cache) / _folder_name(root, reading)
     home.mkdir(parents=True, exist_ok=True)
     with locked(home / _LOCK):  # one process reads, others wait
         remove_partial_characters(home)
