@@ -174,7 +174,11 @@ def project(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         behind a pinhole's plane are finite and meaningless: mask them with in_front.
     """
     check_last_dim("points", points, 3)
-    local = to_camera_frame(cameras, points)
+    return _project_local(cameras, to_camera_frame(cameras, points))
+
+
+def _project_local(cameras: Cameras, local: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """What `project` gives, of points (..., 3) in the cameras' own frames."""
     depth = -local[..., 2]
     in_front = depth > 1e-6
     divisor = torch.where(cameras.orthographic, torch.ones_like(depth), torch.where(in_front, depth, 1.0))
@@ -228,14 +232,8 @@ def project_into_all(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, 
     rotation = cameras.world_from_camera[:, :3, :3]  # (V, 3 world, 3 camera)
     offset = (rotation * cameras.world_from_camera[:, :3, 3:]).sum(1)  # (V, 3): camera centre in its own axes
     num_views = rotation.shape[0]
-    local = (points @ rotation.permute(1, 0, 2).reshape(3, num_views * 3)).unflatten(
-        -1, (num_views, 3)
-    ) - offset
-    depth = -local[..., 2]
-    in_front = depth > 1e-6
-    divisor = torch.where(cameras.orthographic, torch.ones_like(depth), torch.where(in_front, depth, 1.0))
-    flat = torch.stack((local[..., 0], -local[..., 1]), dim=-1) / divisor[..., None]
-    return cameras.principal_point + cameras.focal * flat, depth, in_front
+    turned = (points @ rotation.permute(1, 0, 2).reshape(3, num_views * 3)).unflatten(-1, (num_views, 3))
+    return _project_local(cameras, turned - offset)
 
 
 def directions_to_points(cameras: Cameras, points: Tensor) -> Tensor:
