@@ -1,7 +1,6 @@
 """All sessions: opened, forgotten when no page looks at them any more, and their work."""
 
 import asyncio
-import multiprocessing
 import secrets
 import shutil
 from collections.abc import Callable
@@ -13,16 +12,13 @@ from charnerf.app.limits import Limits
 from charnerf.app.queue import Queue
 from charnerf.app.reader import Reader
 from charnerf.app.session import Session
+from charnerf.capture.parallel import clean_processes
 from charnerf.errors import DataError
 
 
 def process_context() -> BaseContext:
-    """How processes are started: from one that has imported all and computed nothing, where the system has that; else anew."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["charnerf.app.recognizer", "charnerf.app.builder"])
-    return context
+    """How the page's processes are started: from one that has imported all and computed nothing."""
+    return clean_processes("charnerf.app.recognizer", "charnerf.app.builder")
 
 
 @final

@@ -41,7 +41,8 @@ def in_processes(
     if count <= 1:
         yield ((item, work(item)) for item in items)
         return
-    with ProcessPoolExecutor(count, mp_context=_context(), initializer=_begin) as pool:
+    context = clean_processes("charnerf.capture.dataset")
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_begin) as pool:
         waiting = {pool.submit(_do, work, item): item for item in items}
         try:
             yield ((waiting[done], done.result()) for done in as_completed(waiting))
@@ -63,12 +64,16 @@ def _do(work: Callable[[Item], Result], item: Item) -> Result:
         os._exit(stop.status)  # the pool would go on with the next item
 
 
-def _context() -> BaseContext:
-    """Processes that inherit no thread's lock; where the system can, charnerf is imported once for all."""
+def clean_processes(*preloaded: str) -> BaseContext:
+    """How processes are started that inherit no thread's lock: where the system can, from one that has imported modules for all.
+
+    Args:
+        preloaded: Those modules; the first that starts such processes chooses.
+    """
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["charnerf.capture.dataset"])
+    context.set_forkserver_preload(list(preloaded))
     return context
 
 
