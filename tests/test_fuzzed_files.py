@@ -1,12 +1,17 @@
-"""Files of every reader, changed at random: each is read, or refused by an error of ours. CHARNERF_FUZZ says how many of each."""
+"""Files of every reader, changed at random: each is read, or refused by an error of ours. CHARNERF_FUZZ says how many of each.
+
+CHARNERF_FUZZ_TABLE names a CSV file, which gets the longest time and the most memory that one of them took.
+"""
 
 import base64
+import csv
 import gzip
 import json
 import os
 import shutil
+import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +39,8 @@ from charnerf.training.search import JOURNAL, Search
 from support import foreign_sets as sets
 from support import helpers
 
+MOST_MIB = 2048.0  # that a file of some kB may make a reader take
+STATUS = Path("/proc/self/status")
 TIMES = int(os.environ.get("CHARNERF_FUZZ", "3"))
 WORDS = [
     *(
@@ -133,6 +140,37 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "obj": ("mesh/x.obj", lambda folder: load_scene(folder / "x.obj")),
     "ply": ("mesh/x.ply", lambda folder: load_scene(folder / "x.ply")),
 }
+
+
+def memory_mib(key: str) -> float:
+    """Resident memory of this process now (VmRSS), or its peak since `forget_peak` (VmHWM); 0 where no system says."""
+    if not STATUS.is_file():
+        return 0.0
+    return next(float(line.split()[1]) / 1024 for line in STATUS.read_text().splitlines() if key in line)
+
+
+def forget_peak() -> None:
+    if STATUS.is_file():
+        (STATUS.parent / "clear_refs").write_text("5")
+
+
+@pytest.fixture(scope="module")
+def table() -> Iterator[list[dict[str, object]]]:
+    """Rows of what each kind took; written where a file is named."""
+    rows: list[dict[str, object]] = []
+    yield rows
+    if "CHARNERF_FUZZ_TABLE" in os.environ and rows:
+        rows.append(
+            {
+                "file": "all",
+                "inputs": sum(row["inputs"] for row in rows),
+                **{key: max(row[key] for row in rows) for key in ("longest seconds", "most MiB")},
+            }
+        )
+        with open(os.environ["CHARNERF_FUZZ_TABLE"], "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
 
 
 @pytest.fixture(scope="module")
@@ -260,11 +298,14 @@ def _write_texts(root: Path) -> None:
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_a_changed_file_is_read_or_refused(name: str, whole: Path, tmp_path: Path) -> None:
+def test_a_changed_file_is_read_or_refused(
+    name: str, whole: Path, table: list[dict[str, object]], tmp_path: Path
+) -> None:
     file, reader = READERS[name]
     folder = tmp_path / file.split("/")[0]
     shutil.copytree(whole / folder.name, folder)
     whole_content = (tmp_path / file).read_bytes()
+    took: list[tuple[float, float]] = []
 
     @settings(
         max_examples=TIMES,
@@ -276,12 +317,25 @@ def test_a_changed_file_is_read_or_refused(name: str, whole: Path, tmp_path: Pat
     @given(changes=CHANGES)
     def read(changes: list[Change]) -> None:
         (tmp_path / file).write_bytes(changed(whole_content, changes))
+        forget_peak()
+        before, began = memory_mib("VmRSS"), time.perf_counter()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
                 reader(folder)
             except (CharNeRFError, OSError):
                 pass
+        took.append((time.perf_counter() - began, memory_mib("VmHWM") - before))
+        assert took[-1][1] < MOST_MIB
         assert not (tmp_path / "etc").exists()
 
     read()
+    seconds, mib = (max(column) for column in zip(*took, strict=True))
+    table.append(
+        {
+            "file": name,
+            "inputs": len(took),
+            "longest seconds": round(seconds, 2),
+            "most MiB": round(mib, 1),
+        }
+    )

@@ -1,5 +1,6 @@
 """Every command, key, option and path that README and docs print: run where that takes seconds, parsed or composed elsewhere."""
 
+import ast
 import json
 import re
 import runpy
@@ -255,6 +256,35 @@ def test_every_key_option_and_path_is_there(page: Path, keys: set[str]) -> None:
                 assert key in keys or key.rpartition(".")[0] in keys, text
             elif re.match(r"(src|conf|docs|tests|benchmarks)/[a-z_0-9/.]+$", word):
                 assert (ROOT / word).exists(), text
+
+
+def fault_rows() -> list[tuple[str, str]]:
+    """Each fault of the table of what is promised, and the cell that names its tests."""
+    text = (ROOT / "docs/reliability.md").read_text(encoding="utf-8")
+    lines = text.partition("## Faults")[2].partition("\n## ")[0].splitlines()
+    rows = [line.strip("| ").split(" | ") for line in lines if line.startswith("| ")]
+    table = rows[2 : next(number for number, row in enumerate(rows) if row[0] == "again and again")]
+    assert all(len(row) == 3 for row in table) and len(table) > 40
+    return [(row[0], row[2]) for row in table]
+
+
+@pytest.mark.parametrize("fault,cell", fault_rows())
+def test_every_fault_names_tests_that_are_there(fault: str, cell: str) -> None:
+    """A file said to be slow has slow tests; one of another has tests that always run."""
+    named = re.findall(r"`(tests/[a-z_0-9/]+\.py)`( \(slow\))?", cell)
+    assert named, fault
+    for file, slow in named:
+        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+        marked = [
+            any("mark.slow" in ast.unparse(mark) for mark in test.decorator_list)
+            for test in tree.body
+            if isinstance(test, ast.FunctionDef) and test.name.startswith("test_")
+        ]
+        whole = any(
+            isinstance(line, ast.Assign) and "pytestmark" in (text := ast.unparse(line)) and "slow" in text
+            for line in tree.body
+        )
+        assert marked and (whole or any(marked) if slow else not whole and not all(marked)), file
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
