@@ -130,7 +130,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "index": (f"shards/{INDEX_FILE}", lambda folder: read_index(folder / INDEX_FILE)),
     "shard": ("shards/000000.tar", shards),
     "search": (f"search/{JOURNAL}", search),
-    "baked": ("baked/x.safetensors", lambda folder: load_baked(folder / "x.safetensors")),
+    "baked": ("baked/x.safetensors", lambda folder: load_baked(folder / "x.safetensors").render(size=8)),
     "weights": ("weights/x.safetensors", lambda folder: charnerf.load(folder / "x.safetensors")),
     "checkpoint": ("ckpt/x.ckpt", lambda folder: read_checkpoint(folder / "x.ckpt", sealed=False)),
     "config": ("run/config.yaml", lambda folder: read_yaml(folder / "config.yaml")),
@@ -208,7 +208,7 @@ def _write_tensors(root: Path) -> None:
         (root / name).mkdir()
     metadata = {
         "format": "charnerf-baked-1",
-        "baked": json.dumps({"pitch": 0.1, "factor": 2, "tolerance": 0.0, "radius": 1.0, "head": "blend"}),
+        "baked": json.dumps({"pitch": 1.0, "factor": 2, "tolerance": 0.0, "radius": 1.0, "head": "blend"}),
     }
     views = {
         "poses": torch.eye(4).expand(1, 3, 4, 4),
@@ -236,7 +236,7 @@ def _write_tensors(root: Path) -> None:
         "grid.color_index": torch.zeros(3, 3, 3, dtype=torch.int32),
     }
     tensors |= {
-        "grid.color_rows": torch.zeros(1, 9 * 7 + 1),
+        "grid.color_rows": torch.zeros(2, 9 * 7 + 1),
         "grid.gaps": torch.zeros(2, 2, 2, dtype=torch.uint8),
     }
     (root / "baked/x.safetensors").write_bytes(

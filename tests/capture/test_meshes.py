@@ -135,3 +135,9 @@ def test_bad_meshes_are_named(tmp_path, name, write, message):
     with pytest.raises(DataError, match=message) as caught:
         load_scene(tmp_path / name)
     assert str(tmp_path / name) in str(caught.value)
+
+
+def test_vertices_of_two_numbers_are_refused(tmp_path):
+    (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
+    with pytest.raises(DataError, match=r"flat\.obj: .*expected \(n, 3\)"):
+        load_scene(tmp_path / "flat.obj")

@@ -79,9 +79,19 @@ def _contents(file):
         ("grid.kept", lambda one: one.float(), "grid.kept: found"),
         ("grid.gaps", lambda one: one[:-1].contiguous(), "grid.u: found"),
         ("grid.color_rows", lambda one: one[:, 1:].contiguous(), "grid.color_rows: found"),
+        ("grid.color_rows", lambda one: one[:0].contiguous(), "grid.color_rows: found no colours"),
+        ("grid.rows", lambda one: one[0, 0].clone(), "grid.rows: found"),
+        ("grid.high", lambda one: one * 1e38, "grid.high: found values that are not finite"),
+        ("grid.high", lambda one: one + 100.0, "expected one within its cells"),
+        ("drawn.focal", lambda one: one.double(), "cameras with numbers"),
+        ("drawn.focal", lambda one: 0.0 * one, "cameras with numbers"),
+        ("views.poses", lambda one: one * float("inf"), "cameras with numbers"),
+        ("views.orthographic", lambda one: one.float(), "cameras with numbers"),
+        ("views.images", lambda one: one * float("nan"), "views: found images"),
+        ("drawn.encoded", lambda one: one.int(), "drawn: pictures"),
         ("views.present", lambda one: one.float(), "views: found images"),
-        ("drawn.encoded", None, "lacks a part of a baked character"),
-        ("drawn.focal", lambda one: one[:1].contiguous(), "lacks a part of a baked character"),
+        ("drawn.encoded", None, "is missing or wrong"),
+        ("drawn.focal", lambda one: one[:1].contiguous(), "is missing or wrong"),
     ],
 )
 def test_broken_files_are_named(file, tmp_path, name, change, words):
@@ -99,9 +109,13 @@ def test_other_files_are_refused(file, tmp_path):
     save_file(tensors, other, metadata={"format": "else"})
     with pytest.raises(DataError, match="charnerf reconstruct --bake"):
         load_baked(other)
-    facts = {**json.loads(metadata["baked"]), "factor": 10**9}
-    save_file(tensors, other, metadata={**metadata, "baked": json.dumps(facts)})
-    with pytest.raises(DataError, match="expected pitch, factor"):
+    facts = json.loads(metadata["baked"])
+    for wrong in ({"factor": 10**9}, {"radius": 0}, {"pitch": 1e308}, {"tolerance": 10**400}, {"head": []}):
+        save_file(tensors, other, metadata={**metadata, "baked": json.dumps({**facts, **wrong})})
+        with pytest.raises(DataError, match="expected pitch, factor"):
+            load_baked(other)
+    save_file(tensors, other, metadata={**metadata, "baked": json.dumps({**facts, "pitch": 1e-9})})
+    with pytest.raises(DataError, match="expected one within its cells"):
         load_baked(other)
     save_file(tensors, other, metadata={**metadata, "baked": "[1]"})
     with pytest.raises(DataError, match="expected pitch, factor"):

@@ -20,7 +20,6 @@ the colour before its sigmoid. The metadata say pitch, factor, tolerance, radius
 """
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -56,6 +55,8 @@ GRID = {
     "low": torch.float32, "high": torch.float32, "origin": torch.float32, "u": torch.float32,
     "kept": torch.float16, "errors": torch.float32, "color_index": torch.int32, "color_rows": torch.float32, "gaps": torch.uint8,
 }  # fmt: skip
+MOST = 1e9  # metres, pixels: squares of larger numbers are beyond what can be told apart, or finite
+FINEST = 1e-5  # of a place: a ray that is told in 32 bits makes no way in cells much smaller
 CAMERA = ("poses", "focal", "principal_point", "orthographic")
 
 
@@ -118,8 +119,8 @@ def load_baked(path: str | Path) -> Hero:
         )
         drawn = tensors["drawn.encoded"]
         for one in (drawn, tensors.get("drawn.detailed", drawn)):
-            if one.ndim != len("VCHW") or one.shape[:2] != (len(drawn), 3):
-                raise IndexError(f"drawn: pictures of shape {tuple(one.shape)}")
+            if one.ndim != len("VCHW") or one.shape[:2] != (len(drawn), 3) or not _is_sound(one):
+                raise IndexError(f"drawn: pictures of shape {tuple(one.shape)} of {one.dtype}")
         cameras = _cameras(tensors, "drawn", drawn)
         encoded = Pictures.of(drawn, drawn.shape[-1])
         images = tensors["views.images"]
@@ -130,7 +131,9 @@ def load_baked(path: str | Path) -> Hero:
             mirrored=tensors["views.mirrored"],
         )
     except (KeyError, IndexError, RuntimeError) as error:
-        raise DataError(f"{file}: lacks a part of a baked character ({error}); bake it again.") from error
+        raise DataError(
+            f"{file}: a part of a baked character is missing or wrong ({error}); bake it again."
+        ) from error
     _check(file, grid, facts, views, len(drawn))
     paint = DrawnColoring(HEADS[facts["head"]], cameras, encoded, tensors.get("drawn.detailed"), encoded)
     baked = Baked(grid, 1, 0, 0, grid.u.numel(), 0.0)
@@ -168,9 +171,16 @@ def _cameras(tensors: Mapping[str, Tensor], name: str, pictures: Tensor) -> Came
                 f"{name}: cameras of shape {tuple(part.shape)} for pictures {tuple(pictures.shape)}"
             )
     poses, focal, principal_point, orthographic = parts
+    if not all(map(_is_sound, parts[:3])) or not bool((focal > 0).all()) or orthographic.dtype != torch.bool:
+        raise IndexError(f"{name}: cameras with numbers that are not finite, or of no length")
     return Cameras(
         poses, focal, principal_point, orthographic, width=pictures.shape[-1], height=pictures.shape[-2]
     )
+
+
+def _is_sound(values: Tensor) -> bool:
+    """Whether they are numbers that can be computed with."""
+    return values.dtype == torch.float32 and bool((values.abs() < MOST).all())
 
 
 def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
@@ -184,14 +194,15 @@ def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     read = parse_json(metadata.get("baked", ""), str(file))
     facts = read if isinstance(read, dict) else {}
     numbers = {name: facts.get(name) for name in ("pitch", "tolerance", "radius")}
-    sound = all(isinstance(one, int | float) and 0 <= one < math.inf for one in numbers.values())
+    sound = all(isinstance(one, int | float) and 0 <= one < MOST for one in numbers.values())
     factor, head = facts.get("factor"), facts.get("head")
     if (
         not sound
         or not numbers["pitch"]
+        or not numbers["radius"]
         or not isinstance(factor, int)
         or not 1 <= factor <= 64
-        or head not in HEADS
+        or head not in list(HEADS)
     ):
         raise DataError(
             f"{file}: found {facts} in its metadata, expected pitch, factor, tolerance, radius and head of a baked character."
@@ -209,7 +220,7 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
         "kept": points,
         "errors": cells,
         "color_index": tuple(n + 1 for n in cells),
-        "color_rows": (len(grid.color_rows), columns),
+        "color_rows": (*grid.color_rows.shape[:1], columns),
     }  # fmt: skip
     for name, dtype in GRID.items():
         value = getattr(grid, name)
@@ -222,8 +233,23 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
             raise DataError(
                 f"{file}: grid.{name}: found {tuple(value.shape)} of {value.dtype}, expected {shape} of {dtype}."
             )
-        if value.dtype.is_floating_point and not bool(value.isfinite().all()):
-            raise DataError(f"{file}: grid.{name}: found values that are not finite, expected numbers.")
+        if value.dtype.is_floating_point and not bool((value.abs() < MOST).all()):
+            raise DataError(
+                f"{file}: grid.{name}: found values that are not finite, or beyond {MOST:g}; bake it again."
+            )
+    far = torch.maximum(grid.low.abs(), grid.high.abs()).max()
+    end = grid.origin + grid.pitch * (torch.tensor(cells) + 1)
+    if grid.pitch < FINEST * float(far) or bool(
+        (grid.low < grid.origin - grid.pitch).any() | (grid.high > end).any()
+    ):
+        raise DataError(
+            f"{file}: grid: found a box from {grid.low.tolist()} to {grid.high.tolist()} m, expected one within its cells of "
+            f"{grid.pitch} m from {grid.origin.tolist()}; bake it again."
+        )
+    if not grid.has_colors:
+        raise DataError(
+            f"{file}: grid.color_rows: found no colours, expected those of a character; bake it again."
+        )
     low, high = (int(one) for one in torch.aminmax(grid.color_index))
     if low < 0 or high >= len(grid.color_rows):
         raise DataError(
@@ -234,6 +260,7 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
         views.images.ndim == len("BVCHW")
         and views.images.shape[0] == 1
         and views.images.shape[2] == len("RGBA")
+        and _is_sound(views.images)
     )
     if not whole or any(one.dtype != torch.bool or one.shape != views.images.shape[:2] for one in marks):
         raise DataError(

@@ -30,6 +30,11 @@ def read_scene(path: Path) -> trimesh.Scene:
     """
     try:
         scene = _read_scene(path)
+        for name, mesh in scene.geometry.items():
+            if isinstance(mesh, trimesh.Trimesh) and mesh.vertices.shape[1:] != (3,):
+                raise DataError(
+                    f"{name}: found vertices {mesh.vertices.shape}, expected (n, 3); export it again."
+                )
         _load_pictures(scene)
     except (MemoryError, KeyboardInterrupt):
         raise
