@@ -130,7 +130,10 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "index": (f"shards/{INDEX_FILE}", lambda folder: read_index(folder / INDEX_FILE)),
     "shard": ("shards/000000.tar", shards),
     "search": (f"search/{JOURNAL}", search),
-    "baked": ("baked/x.safetensors", lambda folder: load_baked(folder / "x.safetensors").render(size=8)),
+    "baked": (
+        "baked/x.safetensors",
+        lambda folder: load_baked(folder / "x.safetensors").render(azimuth_deg=30.0, size=8),
+    ),
     "weights": ("weights/x.safetensors", lambda folder: charnerf.load(folder / "x.safetensors")),
     "checkpoint": ("ckpt/x.ckpt", lambda folder: read_checkpoint(folder / "x.ckpt", sealed=False)),
     "config": ("run/config.yaml", lambda folder: read_yaml(folder / "config.yaml")),

@@ -347,6 +347,7 @@ def test_an_obj_reads_its_own_folder_alone(tmp_path: Path) -> None:
         lambda one: one["accessors"][0].update(count=10**12),
         lambda one: one["accessors"][0].pop("bufferView") or one["accessors"][0].update(count=10**10),
         lambda one: one.update(nodes=3),
+        lambda one: one["nodes"][0].update(name="\ud800"),
     ],
 )
 def test_gltf_that_never_ends_is_refused(edit: Callable[[dict], object], tmp_path: Path) -> None:

@@ -110,7 +110,14 @@ def test_other_files_are_refused(file, tmp_path):
     with pytest.raises(DataError, match="charnerf reconstruct --bake"):
         load_baked(other)
     facts = json.loads(metadata["baked"])
-    for wrong in ({"factor": 10**9}, {"radius": 0}, {"pitch": 1e308}, {"tolerance": 10**400}, {"head": []}):
+    for wrong in (
+        {"factor": 10**9},
+        {"radius": 0},
+        {"pitch": True},
+        {"pitch": 1e308},
+        {"tolerance": 10**400},
+        {"head": []},
+    ):
         save_file(tensors, other, metadata={**metadata, "baked": json.dumps({**facts, **wrong})})
         with pytest.raises(DataError, match="expected pitch, factor"):
             load_baked(other)

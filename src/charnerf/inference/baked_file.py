@@ -194,13 +194,13 @@ def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     read = parse_json(metadata.get("baked", ""), str(file))
     facts = read if isinstance(read, dict) else {}
     numbers = {name: facts.get(name) for name in ("pitch", "tolerance", "radius")}
-    sound = all(isinstance(one, int | float) and 0 <= one < MOST for one in numbers.values())
+    sound = all(type(one) in (int, float) and 0 <= one < MOST for one in numbers.values())
     factor, head = facts.get("factor"), facts.get("head")
     if (
         not sound
         or not numbers["pitch"]
         or not numbers["radius"]
-        or not isinstance(factor, int)
+        or type(factor) is not int
         or not 1 <= factor <= 64
         or head not in list(HEADS)
     ):

@@ -30,7 +30,9 @@ def read_scene(path: Path) -> trimesh.Scene:
     """
     try:
         scene = _read_scene(path)
-        for name, mesh in scene.geometry.items():
+        for node in scene.graph.nodes_geometry:  # whose names trimesh encodes
+            name = scene.graph[node][1]
+            mesh = scene.geometry[name]
             if isinstance(mesh, trimesh.Trimesh) and mesh.vertices.shape[1:] != (3,):
                 raise DataError(
                     f"{name}: found vertices {mesh.vertices.shape}, expected (n, 3); export it again."
