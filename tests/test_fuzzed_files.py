@@ -210,7 +210,7 @@ def _write_tensors(root: Path) -> None:
     for name in ("baked", "weights", "ckpt"):
         (root / name).mkdir()
     metadata = {
-        "format": "charnerf-baked-1",
+        "format": "charnerf-baked-2",
         "baked": json.dumps({"pitch": 1.0, "factor": 2, "tolerance": 0.0, "radius": 1.0, "head": "blend"}),
     }
     views = {
@@ -234,8 +234,9 @@ def _write_tensors(root: Path) -> None:
         "grid.origin": -torch.ones(3),
     }
     tensors |= {
-        "grid.index": torch.zeros(5, 5, 5, dtype=torch.int32),
-        "grid.rows": torch.zeros(2, 3),
+        "grid.u": torch.zeros(5, 5, 5),
+        "grid.kept": torch.ones(5, 5, 5, dtype=torch.float16),
+        "grid.errors": torch.zeros(2, 2, 2),
         "grid.color_index": torch.zeros(3, 3, 3, dtype=torch.int32),
     }
     tensors |= {

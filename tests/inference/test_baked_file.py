@@ -80,7 +80,7 @@ def _contents(file):
         ("grid.gaps", lambda one: one[:-1].contiguous(), "grid.u: found"),
         ("grid.color_rows", lambda one: one[:, 1:].contiguous(), "grid.color_rows: found"),
         ("grid.color_rows", lambda one: one[:0].contiguous(), "grid.color_rows: found no colours"),
-        ("grid.rows", lambda one: one[0, 0].clone(), "grid.rows: found"),
+        ("grid.color_rows", lambda one: one[0, 0].clone(), "grid.color_rows: found"),
         ("grid.high", lambda one: one * 1e38, "grid.high: found values that are not finite"),
         ("grid.high", lambda one: one + 100.0, "expected one within its cells"),
         ("drawn.focal", lambda one: one.double(), "cameras with numbers"),
