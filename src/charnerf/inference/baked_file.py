@@ -237,15 +237,7 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
             raise DataError(
                 f"{file}: grid.{name}: found values that are not finite, or beyond {MOST:g}; bake it again."
             )
-    far = torch.maximum(grid.low.abs(), grid.high.abs()).max()
-    end = grid.origin + grid.pitch * (torch.tensor(cells) + 1)
-    if grid.pitch < FINEST * float(far) or bool(
-        (grid.low < grid.origin - grid.pitch).any() | (grid.high > end).any()
-    ):
-        raise DataError(
-            f"{file}: grid: found a box from {grid.low.tolist()} to {grid.high.tolist()} m, expected one within its cells of "
-            f"{grid.pitch} m from {grid.origin.tolist()}; bake it again."
-        )
+    _check_box(file, grid)
     if not grid.has_colors:
         raise DataError(
             f"{file}: grid.color_rows: found no colours, expected those of a character; bake it again."
@@ -266,4 +258,17 @@ def _check(file: Path, grid: BakedGrid, facts: Mapping[str, Any], views: SourceV
         raise DataError(
             f"{file}: views: found images {tuple(views.images.shape)}, expected (1, V, 4, H, W), and present and mirrored (1, V) "
             "of booleans."
+        )
+
+
+def _check_box(file: Path, grid: BakedGrid) -> None:
+    """Check that rays leave the grid: they end at its box, which its cells reach."""
+    far = torch.maximum(grid.low.abs(), grid.high.abs()).max()
+    end = grid.origin + grid.pitch * (torch.tensor(grid.gaps.shape) + 1)
+    if grid.pitch < FINEST * float(far) or bool(
+        (grid.low < grid.origin - grid.pitch).any() | (grid.high > end).any()
+    ):
+        raise DataError(
+            f"{file}: grid: found a box from {grid.low.tolist()} to {grid.high.tolist()} m, expected one within its cells of "
+            f"{grid.pitch} m from {grid.origin.tolist()}; bake it again."
         )
