@@ -6,7 +6,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -80,7 +80,8 @@ def inside(folder: Path, name: str, where: str) -> Path:
         home = folder.resolve()
         file = folder / name
         is_inside = not Path(name).is_absolute() and ".." not in Path(name).parts
-        file.exists()  # says whether the name is too long
+        with suppress(FileNotFoundError, NotADirectoryError):
+            file.stat()  # says whether the name is too long, or a loop of links
         if is_inside and file.resolve().is_relative_to(home):
             return file
     except (ValueError, OSError, RuntimeError) as error:  # NUL, too long, a loop of links

@@ -264,7 +264,8 @@ def _capture_items(
                     outcomes[item] = outcome
                 pace = len(outcomes) / (time.perf_counter() - began)
                 progress.update(len(outcomes) / len(items), f"{pace:.3g} characters a second")
-    finally:  # interrupted: what was written meanwhile belongs to the data set too
+    finally:  # interrupted: what was written meanwhile belongs to the data set too, what a process left half written does not
+        remove_partial_characters(root)
         unlisted = [item.name for item in items if item not in outcomes and (root / item.name).is_dir()]
         if unlisted:
             add(unlisted)
