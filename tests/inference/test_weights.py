@@ -163,6 +163,18 @@ def test_files_that_are_no_weights_are_named(tmp_path: Path, weights: Path) -> N
         charnerf.load(rewritten(weights, {"model": {"width": 32}}))
 
 
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+def test_weights_of_a_training_that_diverged_are_named(weights: Path, tmp_path: Path, value: float) -> None:
+    with safe_open(str(weights), framework="pt") as opened:
+        metadata = opened.metadata()
+    state = load_file(weights)
+    name = next(iter(state))
+    state[name].view(-1)[-1] = value
+    save_file(state, str(tmp_path / "diverged.safetensors"), metadata=metadata)
+    with pytest.raises(DataError, match=rf"diverged\.safetensors: found NaN or infinity in {name}"):
+        charnerf.load(tmp_path / "diverged.safetensors")
+
+
 def test_a_hero_is_rendered_and_meshed(weights: Path) -> None:
     """An untrained field fills the hull: it is seen from any angle, and its mesh stands on the floor."""
     model = charnerf.load(weights)

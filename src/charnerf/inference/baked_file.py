@@ -183,6 +183,11 @@ def _is_sound(values: Tensor) -> bool:
     return values.dtype == torch.float32 and bool((values.abs() < MOST).all())
 
 
+def _is_number(value: object) -> bool:
+    """Whether JSON holds a number from 0 on that can be computed with."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < MOST
+
+
 def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Tensors by name, and what the metadata say."""
     tensors, metadata = read_tensors(
@@ -193,17 +198,15 @@ def _read(file: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     )
     read = parse_json(metadata.get("baked", ""), str(file))
     facts = read if isinstance(read, dict) else {}
-    numbers = {name: facts.get(name) for name in ("pitch", "tolerance", "radius")}
-    sound = all(type(one) in (int, float) and 0 <= one < MOST for one in numbers.values())
-    factor, head = facts.get("factor"), facts.get("head")
-    if (
-        not sound
-        or not numbers["pitch"]
-        or not numbers["radius"]
-        or type(factor) is not int
-        or not 1 <= factor <= 64
-        or head not in list(HEADS)
-    ):
+    fits = (
+        all(_is_number(facts.get(name)) for name in ("pitch", "tolerance", "radius"))
+        and facts["pitch"] > 0
+        and facts["radius"] > 0
+        and type(facts.get("factor")) is int
+        and 1 <= facts["factor"] <= 64
+        and facts.get("head") in list(HEADS)
+    )
+    if not fits:
         raise DataError(
             f"{file}: found {facts} in its metadata, expected pitch, factor, tolerance, radius and head of a baked character."
         )

@@ -51,6 +51,7 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
     if not file.is_file():
         raise DataError(f"{file}: found a pipe or device, expected a run folder, a .ckpt or a .safetensors.")
     cfg, state = _read_safetensors(file) if file.suffix == ".safetensors" else _read_checkpoint(file)
+    _check_numbers(file, state)
     try:
         validate_model(cfg, trusted_targets=trusted_targets)
     except ConfigError as error:
@@ -73,6 +74,20 @@ def load(path: str | Path | None = None, *, trusted_targets: Sequence[str] = ())
         source=file,
         note=_note_of(file),
     )
+
+
+def _check_numbers(file: Path, state: Mapping[str, Tensor]) -> None:
+    """Check that weights can be computed with.
+
+    Raises:
+        DataError: If one is not finite.
+    """
+    for name, value in state.items():
+        if isinstance(value, Tensor) and not bool(value.isfinite().all()):
+            raise DataError(
+                f"{file}: found NaN or infinity in {name}, expected finite weights. A training that diverged leaves such: name an"
+                " earlier checkpoint of it, or train anew with a lower scale.learning_rate."
+            )
 
 
 def _check_shapes(cfg: DictConfig, state: Mapping[str, Tensor]) -> None:
