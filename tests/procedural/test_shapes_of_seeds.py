@@ -22,7 +22,7 @@ def box(half, color):
     return Solid(np.asarray(mesh.vertices), np.asarray(mesh.faces), np.tile(color, (8, 1)))
 
 
-@pytest.mark.parametrize("kind", set(KINDS), ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", dict.fromkeys(KINDS), ids=lambda kind: kind.__name__)
 def test_solids_are_closed_turned_outwards_and_fill_the_cube(kind):
     for seed in range(4):
         solid = make_solid(np.random.default_rng(seed), [RED, BLUE], kind)
