@@ -42,7 +42,6 @@ def test_views_that_agree_stay_bit_for_bit():
     front = figure()
     canvases = [front, figure(arm_deg=5.0), mirrored(front)]
     found = reconcile(canvases, [0.0, 90.0, 180.0])
-    assert found.changes_nothing
     for given, kept in zip(canvases, found.apply(canvases), strict=True):
         assert kept is given
 

@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from charnerf.reconciling.agreement import disagreement, iou, share_apart
+from charnerf.reconciling.agreement import iou, share_apart
 from charnerf.reconciling.heights import row_offsets
 from charnerf.reconciling.registration import SIDE, filled, find_flow, premultiplied, resized, warped
 from charnerf.reconciling.tolerance import TOLERANCES, tolerances, widened
@@ -28,9 +28,8 @@ class ViewAgreement:
     Attributes:
         partner: Index of the view from the opposite side, whose outline this one's mirrors; None where there is none.
         apart_before: Share of the two outlines' pixels that lie apart by more than a pixel of 128, as drawn; 0 without a
-            partner, as are the next three.
+            partner, as is the next.
         apart_after: The same once moved, before the outline was taken over.
-        rows_apart: `apart_before` by row from the top, (SIDE,).
         iou_before: Of the outlines as drawn; 1 without a partner.
         iou_after: Once moved.
         iou_unmirrored: As drawn, without mirroring: larger where a view was traced.
@@ -45,7 +44,6 @@ class ViewAgreement:
     partner: int | None
     apart_before: float
     apart_after: float
-    rows_apart: np.ndarray
     iou_before: float
     iou_after: float
     iou_unmirrored: float
@@ -68,11 +66,6 @@ class Reconciliation:
 
     views: tuple[ViewAgreement, ...]
     flows: tuple[np.ndarray | None, ...]
-
-    @property
-    def changes_nothing(self) -> bool:
-        """Whether all views stay as they are."""
-        return not any(one.is_mended for one in self.views)
 
     def apply(self, canvases: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Reconcile canvases (S, S, 4) of the same views at any size; a view that agrees is returned as it is."""
@@ -153,7 +146,6 @@ def _agreement(
         partner=partner,
         apart_before=share_apart(target, outline),
         apart_after=share_apart(target, after),
-        rows_apart=disagreement(target, outline),
         iou_before=iou(target, outline),
         iou_after=overlap,
         iou_unmirrored=iou(target[:, ::-1], outline),
