@@ -16,7 +16,18 @@ MAX_FUNCTION_LINES = 50
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
     ("errors", "interruption"),
-    ("types", "checks", "distributed", "schedule", "files", "hosts", "markdown", "progress", "wording"),
+    (
+        "types",
+        "checks",
+        "distributed",
+        "schedule",
+        "files",
+        "hosts",
+        "markdown",
+        "pools",
+        "progress",
+        "wording",
+    ),
     ("pictures", "viewer"),
     ("process",),
     ("geometry",),

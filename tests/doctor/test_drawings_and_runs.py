@@ -94,8 +94,11 @@ def test_faults_of_runs(finished: Path, tmp_path: Path) -> None:
     (broken / "curve.csv").write_bytes(b"\xff\x00")
     (broken / "nonfinite_batch_0000007.pt").touch()
     (broken / "metrics.json").write_text(json.dumps({"psnr": 1.0}))
-    told = faults(list(run_findings(broken)))
-    assert told.count("numbers that are not finite") == 2 and told.count("truncated file") == 3
+    findings = list(run_findings(broken))
+    told = faults(findings)
+    assert told.count("numbers that are not finite") == 1 and told.count("truncated file") == 3
+    (weights,) = (one for one in findings if one.fault == "broken weights")
+    assert "NaN" in weights.found
 
 
 def test_many_alike_are_told_once_and_masks_may_be_of_one_bit(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from charnerf.app.limits import Limits
 from charnerf.app.queue import Queue
 from charnerf.app.reader import Reader
 from charnerf.app.session import Session
-from charnerf.capture.parallel import clean_processes
 from charnerf.errors import DataError
+from charnerf.pools import clean_processes
 
 
 def process_context() -> BaseContext:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from typing import TypeVar
 
@@ -16,6 +15,7 @@ import torch
 
 from charnerf.errors import DataError
 from charnerf.interruption import Stopped, listening
+from charnerf.pools import clean_processes
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -62,19 +62,6 @@ def _do(work: Callable[[Item], Result], item: Item) -> Result:
             return work(item)
     except Stopped as stop:
         os._exit(stop.status)  # the pool would go on with the next item
-
-
-def clean_processes(*preloaded: str) -> BaseContext:
-    """How processes are started that inherit no thread's lock: where the system can, from one that has imported modules for all.
-
-    Args:
-        preloaded: Those modules; the first that starts such processes chooses.
-    """
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(preloaded))
-    return context
 
 
 def _begin() -> None:
