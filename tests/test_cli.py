@@ -319,7 +319,11 @@ sys.exit(cli.run(["train", *sys.argv[1:]]))
 """
 
 
-@pytest.mark.parametrize("typed", [["seed=0,1", "-m"], ["scale=smoke", "-m", "seed=0,1"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "typed",
+    [["seed=0,1", "-m"], pytest.param(["scale=smoke", "-m", "seed=0,1"], marks=pytest.mark.slow)],
+    ids=" ".join,
+)
 def test_a_grids_overrides_stand_before_or_after_m(typed: list[str], tmp_path: Path) -> None:
     command = [sys.executable, "-c", NO_TRAINING, *typed]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)

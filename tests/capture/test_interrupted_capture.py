@@ -98,7 +98,11 @@ def test_a_mesh_that_has_changed_is_another_capture(boxes, tmp_path, monkeypatch
 
 @pytest.mark.parametrize(
     ("number", "status"),
-    [(signal.SIGTERM, 143), pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow), (signal.SIGKILL, -9)],
+    [
+        (signal.SIGTERM, 143),
+        pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, -9, marks=pytest.mark.slow),
+    ],
 )
 def test_the_command_stops_with_its_workers_and_goes_on(boxes, tmp_path, number, status):
     root = tmp_path / "set"

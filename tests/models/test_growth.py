@@ -49,7 +49,7 @@ def test_a_grown_model_answers_as_the_small_one(person_views, combining, head, d
     assert answers[0][1].densities.std() > 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(width=st.integers(2 * tiny_models.WIDTH, 40), num_blocks=st.integers(1, 3))
 def test_what_is_new_learns_from_the_first_step(person_views, width, num_blocks):
     """New units are written at random and read by none: the gradient reaches the weights that would read them."""

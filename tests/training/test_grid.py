@@ -39,6 +39,7 @@ TRAINED = """
 """
 
 
+@pytest.mark.slow
 def test_a_cell_killed_in_the_middle_ends_as_the_one_that_was_not(figure_dataset, tmp_path):
     """kill -9 while it trains: the next start goes on from its checkpoint, to the same weights bit by bit."""
     grid = tmp_path / "grid"

@@ -146,6 +146,7 @@ def test_the_command_ends_with_its_status_and_its_workers(figure_dataset, tmp_pa
     assert not any(is_alive(worker) for worker in workers)
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_training_that_is_killed(figure_dataset, tmp_path):
     process = start(
         figure_dataset, tmp_path / "run", "scale.steps=100000", "validation.times=20000", "batches.workers=2"
