@@ -99,10 +99,18 @@ def read_state(run: Path, name: str, history: History) -> State:
         name: What it is called.
         history: What it wrote.
     """
-    is_over = not is_locked(run / LOCK_FILE)
-    steps, seconds = (_measured_after(run) if is_over else None) or _newest(history)
+    is_over, cell = not is_locked(run / LOCK_FILE), _cell(run)
+    is_measured = (  # and not by metrics of before
+        is_over and cell.get("state") in (None, "done") and (run / METRICS_FILE).is_file()
+    )
+    steps, seconds = (_measured(run) if is_measured else None) or _newest(history)
     share = _share(run, steps, seconds)
-    stage = _stage_at_end(run) if is_over else _stage_at_work(steps, share)
+    if not is_over:
+        stage = _stage_at_work(steps, share)
+    elif is_measured:
+        stage = Stage.DONE
+    else:
+        stage = Stage.FAILED if cell.get("state") == "failed" else Stage.STOPPED
     trains = stage is Stage.TRAINS and share is not None and share > 0.0
     return State(
         name=name,
@@ -112,7 +120,7 @@ def read_state(run: Path, name: str, history: History) -> State:
         seconds=seconds,
         left_s=seconds * (1.0 - share) / share if trains and share is not None else None,
         psnr_foreground=history.last("val/psnr_foreground"),
-        error=_error(run) if stage is Stage.FAILED else "",
+        error=str(cell.get("error") or "")[:1000] if stage is Stage.FAILED else "",
     )
 
 
@@ -123,23 +131,8 @@ def _stage_at_work(steps: int, share: float | None) -> Stage:
     return Stage.TRAINS if steps else Stage.BEGUN
 
 
-def _stage_at_end(run: Path) -> Stage:
-    """Of a run that nobody works on."""
-    recorded = _cell(run).get("state")
-    if recorded == "failed":
-        return Stage.FAILED
-    return Stage.DONE if _is_measured(run) else Stage.STOPPED
-
-
-def _is_measured(run: Path) -> bool:
-    """Whether it has metrics, and not those of before."""
-    return (run / METRICS_FILE).is_file() and _cell(run).get("state") in (None, "done")
-
-
-def _measured_after(run: Path) -> tuple[int, float] | None:
-    """Steps and training seconds that its metrics tell; None where there are none yet, or they do not."""
-    if not _is_measured(run):
-        return None
+def _measured(run: Path) -> tuple[int, float] | None:
+    """Steps and training seconds that its metrics tell; None where they do not."""
     try:
         metrics = read_metrics(run / METRICS_FILE)
         return int(metrics["steps"]), float(metrics["seconds"]["train"])
@@ -175,7 +168,3 @@ def _cell(run: Path) -> dict[str, Any]:
     except (CharNeRFError, OSError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
-
-
-def _error(run: Path) -> str:
-    return str(_cell(run).get("error") or "")[:1000]
