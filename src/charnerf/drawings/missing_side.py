@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from charnerf.drawings.align import on_one_scale
-from charnerf.drawings.viewpoints import Viewpoint, is_between, side_missing
+from charnerf.drawings.viewpoints import Viewpoint, is_turned, side_missing
 from charnerf.reconciling import reconcile
 
 SIDE = 512  # pixels of a guess
@@ -38,8 +38,8 @@ def missing_side(drawn: Mapping[Viewpoint, np.ndarray]) -> tuple[Viewpoint, np.n
         return None
     canvases = on_one_scale(list(drawn.values()), [view.name for view in drawn], SIDE)
     views = {view.azimuth_deg: canvas for view, canvas in zip(drawn, canvases, strict=True)}
-    ruling = next(azimuth for azimuth in views if not is_between(azimuth))
-    between = next((azimuth for azimuth in views if is_between(azimuth)), None)
+    ruling = next(azimuth for azimuth in views if not is_turned(azimuth))
+    between = next((azimuth for azimuth in views if is_turned(azimuth)), None)
     if between is not None:  # its rows at the heights of the ruling view's
         pair = (views[ruling], views[between])
         views[between] = reconcile(pair, (ruling, between)).apply(pair)[1]
@@ -86,7 +86,7 @@ def _half_depths(spans: Mapping[float, tuple[np.ndarray, np.ndarray]]) -> np.nda
     depth = ROUNDNESS * width
     for azimuth, run in widths.items():
         sine = np.sin(np.radians(azimuth))
-        if is_between(azimuth):
+        if is_turned(azimuth):
             seen = np.where(run > 0, 0.5 * _trunk(run), width)
             squared = (seen**2 - (1.0 - sine**2) * width**2) / sine**2
             depth = np.sqrt(np.clip(squared, (LEAST * width) ** 2, (MOST * width) ** 2))

@@ -24,10 +24,8 @@ TURNS = {  # views of a sheet by how many there are, in the order in which a fig
 }
 MOST_NAMED = max(TURNS)
 DOUBTFUL = 0.08  # lead of the best naming over the next one below which the user is asked to look
-LIKE_FRONT, LIKE_WIDTHS = (
-    0.65,
-    0.8,
-)  # IoU with the front, correlation of rows' widths: beyond both, no side view was found
+LIKE_FRONT = 0.65  # IoU with the front's outline beyond which a side may be a three-quarter view
+LIKE_WIDTHS = 0.8  # correlation with its rows' widths beyond which it then is
 LAYOUT_WEIGHT = 0.1
 FIRST_WEIGHT = 0.25  # of a front that stands before the back
 HALVES_WEIGHT = 4.0

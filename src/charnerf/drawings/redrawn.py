@@ -49,12 +49,11 @@ def redrawn(
     """
     if views is None and level == 0:
         return character
-    azimuths = None if views is None else {_stored_name(view): view.azimuth_deg for view in views}
+    azimuths = None if views is None else {_stored_name(view.name): view.azimuth_deg for view in views}
     drawn = draw_character(character, size=SIDE, seed=seed, level=level, azimuths_deg=azimuths).values()
     drawings = turnaround(*drawn) if views is None else dict(zip(views, drawn, strict=True))
     read = read_views(drawings, size=size, options=options)
-    names = tuple("side" if name == "left" else name for name in read.names)
-    return replace(character, sources=read.views, source_names=names)
+    return replace(character, sources=read.views, source_names=tuple(map(_stored_name, read.names)))
 
 
 def with_drawn_sources(
@@ -84,10 +83,10 @@ def with_drawn_sources(
         pictures,
         source_cameras=read.views.cameras[0],
         source_images=to_bytes(read.views.images[0].permute(0, 2, 3, 1)),
-        source_names=tuple(_stored_name(view) for view in views),
+        source_names=tuple(map(_stored_name, read.names)),
     )
 
 
-def _stored_name(view: Viewpoint) -> str:
+def _stored_name(name: str) -> str:
     """Name of a view in a data set: `side` is what most turnarounds call the left one."""
-    return "side" if view.name == "left" else view.name
+    return "side" if name == "left" else name

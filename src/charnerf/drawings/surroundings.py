@@ -23,10 +23,8 @@ DARKENED = (0.25, 0.985)  # brightness of a shadow, by the paper's
 HUE = 5.0  # CIELAB distance of a shadow's hue from the paper's, darkened alike
 OPAQUE = 0.93  # alpha from which a pixel is paint
 SHADOW_TONE = (45.0, 12.0)  # CIELAB: lightest and most colourful that a shadow saved by its alpha is
-CUT_OPAQUE, CUT_SHARE = (
-    0.98,
-    0.6,
-)  # alpha, and the share of a contact with the border that has it, of a figure that is cut off
+CUT_OPAQUE = 0.98  # alpha of a cut through a figure
+CUT_SHARE = 0.6  # of a contact with the border that is so opaque where the figure is cut off
 CUT_WIDTH = 0.01  # of the figure's height: shorter contacts say nothing
 SOFT = 0.3  # translucent pixels per pixel of outline of a figure that was saved with a soft one
 ALIKE_HEIGHT, ALIKE_WIDTH = 0.7, 0.3  # shares of the largest part's that another whole figure has

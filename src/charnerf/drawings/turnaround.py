@@ -19,7 +19,7 @@ from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.missing_side import missing_side
 from charnerf.drawings.options import ReadingOptions, Segment
 from charnerf.drawings.picture import draw_assumptions
-from charnerf.drawings.viewpoints import Viewpoint, is_between
+from charnerf.drawings.viewpoints import Viewpoint, is_turned
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
 from charnerf.geometry.framing import framing_cameras
@@ -225,7 +225,7 @@ def _with_side(figures: Sequence[DrawnFigure]) -> list[DrawnFigure]:
     name = f"the {side.name} side"
     drawing = Drawing(rgba, name, (rgba.shape[1], rgba.shape[0]), lossy=False)
     guess = DrawnFigure(side, drawing, Cutout(rgba, ()), figure_box(rgba[..., 3], name), is_guessed=True)
-    with_it = [guess if is_between(figure.viewpoint.azimuth_deg) else figure for figure in figures]
+    with_it = [guess if is_turned(figure.viewpoint.azimuth_deg) else figure for figure in figures]
     return with_it if guess in with_it else [*with_it, guess]
 
 

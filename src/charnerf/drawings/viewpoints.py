@@ -21,10 +21,8 @@ AZIMUTHS = {
 }
 """Degrees, 0 the front, 90 the character's left side, by name; three-quarter views show the left side unless they say right."""
 
-FACING, SIDEWAYS = (
-    0.1,
-    0.9,
-)  # sines of azimuths: below, from the front or back; above, from a side, which bounds the depth
+FACING = 0.1  # sine of an azimuth below which a view is from the front or back
+SIDEWAYS = 0.9  # the same above which it is from a side, and bounds the depth
 HIGHEST = 80.0  # degrees of elevation: from straight above a figure has no floor line
 
 
@@ -81,7 +79,7 @@ def between_square_ones(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint]:
     return [one for one in viewpoints if one.azimuth_deg % 90.0]
 
 
-def is_between(azimuth_deg: float) -> bool:
+def is_turned(azimuth_deg: float) -> bool:
     """Whether a view is neither from the front nor from the back."""
     return _across(azimuth_deg) > FACING
 
@@ -92,7 +90,7 @@ def side_missing(viewpoints: Sequence[Viewpoint]) -> Viewpoint | None:
     It is the side next to the one view between front, side and back, the left one where there is none. Without a front or a
     back nothing is missing: there is nothing to guess from.
     """
-    between = [one for one in viewpoints if is_between(one.azimuth_deg)]
+    between = [one for one in viewpoints if is_turned(one.azimuth_deg)]
     if len(between) > 1 or len(between) == len(viewpoints) or any(one.elevation_deg for one in viewpoints):
         return None
     if any(_across(one.azimuth_deg) > SIDEWAYS for one in viewpoints):
