@@ -69,6 +69,20 @@ def test_foreign_sets(tmp_path: Path) -> None:
     assert faults(find(tmp_path / "srn")) == ["unreadable character"]
 
 
+def test_the_depth_of_foreign_sets_is_left_alone(tmp_path: Path) -> None:
+    """Nothing reads it, and a sensor's is of the whole room."""
+    cameras, images = sets.around(), sets.pictures(sets.around())
+    sets.write_nerfstudio(tmp_path / "set", cameras, images)
+    file = tmp_path / "set/transforms.json"
+    content = json.loads(file.read_text())
+    content["frames"][0]["depth_file_path"] = "room.png"
+    content["frames"][1]["depth_file_path"] = "broken.png"
+    file.write_text(json.dumps(content))
+    Image.new("I;16", images[0].shape[1::-1], 900).save(tmp_path / "set/room.png")
+    (tmp_path / "set/broken.png").write_bytes(b"no picture")
+    assert list(dataset_findings(tmp_path / "set", processes=1, counter=lambda total: lambda: None)) == []
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run with weights, a curve and metrics; read only."""

@@ -9,14 +9,13 @@ import numpy as np
 import torch
 
 from charnerf.capture.parallel import in_processes
-from charnerf.data.characters import DEPTH_FOLDER
 from charnerf.data.layout import DATASET_FILE, MESH_FILE, TRANSFORMS_FILE, read_dataset
 from charnerf.doctor.camera_file import read_camera_file
 from charnerf.doctor.depth import depth_findings
 from charnerf.doctor.figure import figure_alpha, figure_findings
 from charnerf.doctor.finding import Finding
 from charnerf.doctor.geometry import geometry_findings
-from charnerf.doctor.picture_files import DEPTH_AGAIN, depth_file_findings, duplicates, picture_findings
+from charnerf.doctor.picture_files import DEPTH_AGAIN, duplicates, picture_findings
 from charnerf.doctor.seen import seen
 from charnerf.doctor.surface import mesh_findings
 from charnerf.doctor.views import Patient, View
@@ -101,15 +100,20 @@ def _examine(admit: Callable[[], Patient]) -> list[Finding]:
     kept = spread(torch.tensor(kept, dtype=torch.long), MOST_SEEN).tolist()
     findings += twice
     if not kept:
-        return _told([*findings, *mesh_findings(patient, None)])
+        return _told(
+            [*findings, *mesh_findings(patient, None), *depth_findings(patient.views, {}, are_right=False)]
+        )
     views, pictures, alphas = ([every[place] for place in kept] for every in (views, pictures, alphas))  # type: ignore[assignment]
     wrong, agreeing = geometry_findings(patient, seen(views, pictures, alphas))
     findings += [*wrong, *mesh_findings(patient, agreeing)]
     told = {one.where for one in findings}  # whose pictures or cameras are wrong, whatever their depth is
-    right = [place for place, view in enumerate(views) if not told & {str(view.file), view.key}]
-    views, alphas = ([every[place] for place in right] for every in (views, alphas))  # type: ignore[assignment]
+    right = {
+        view.key: alpha
+        for view, alpha in zip(views, alphas, strict=True)
+        if not told & {str(view.file), view.key}
+    }
     are_right = patient.in_our_frame and not findings
-    return _told([*findings, *depth_findings(views, alphas, are_right=are_right)])
+    return _told([*findings, *depth_findings(patient.views, right, are_right=are_right)])
 
 
 def _examined_view(view: View) -> tuple[np.ndarray | None, np.ndarray | None, list[Finding]]:
@@ -170,8 +174,6 @@ def _of_ours(root: Path, name: str) -> Patient:
         )
         return Patient(name, folder, None, (), (wrong,))
     views, findings = _read(folder, [path])
-    for file in sorted((folder / DEPTH_FOLDER).glob("*.png")):
-        findings += depth_file_findings(file)
     lost = [view.depth for view in views if view.depth is not None and not view.depth.is_file()]
     if lost:
         more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
@@ -192,7 +194,8 @@ def _of_foreign(form: AbstractFormat, found: Found) -> Patient:
         files = camera_files(found.folder)
         views, findings = _read(found.folder, files)
         unique = {view.file: view for view in reversed(views)}
-        kept = tuple(view for view in views if unique[view.file] is view)
+        # nothing reads their depth, which may be a sensor's, of the whole room
+        kept = tuple(replace(view, depth=None) for view in views if unique[view.file] is view)
         return Patient(found.name, found.folder, files[0] if len(files) == 1 else None, kept, tuple(findings))
     try:
         shots = form.shots(found)

@@ -1,15 +1,14 @@
 """Depth pictures against what they belong to: their file, their picture's figure, their camera."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy import ndimage
 
 from charnerf.doctor.finding import Finding
-from charnerf.doctor.picture_files import DEPTH_AGAIN, depth_file_findings
+from charnerf.doctor.picture_files import DEPTH_AGAIN, read_depth
 from charnerf.doctor.views import View
 from charnerf.geometry.world import BOX_HALF_EXTENT, CENTRE
-from charnerf.pictures import open_picture
 
 COVERED = 0.97  # of what lies well inside the one figure, by the other
 EDGE = 2  # pixels at outlines, where a pixel's centre and its alpha may differ
@@ -17,21 +16,23 @@ REACH = 3.0**0.5 * BOX_HALF_EXTENT  # m, from the middle to the box's corners
 
 
 def depth_findings(
-    views: Sequence[View], alphas: Sequence[np.ndarray], *, are_right: bool
+    views: Sequence[View], alphas: Mapping[str, np.ndarray], *, are_right: bool
 ) -> Iterator[Finding]:
     """What is wrong with the depth of a character's views.
 
     Args:
         views: Some have none.
-        alphas: Of their pictures, (H, W) in [0, 1].
+        alphas: Of their pictures, (H, W) in [0, 1], by the views' keys: of those that depth can be held against.
         are_right: Whether cameras and figure are known to be: distances are compared with them.
     """
-    for view, alpha in zip(views, alphas, strict=True):
-        if view.depth is None or not view.depth.is_file() or depth_file_findings(view.depth):
-            continue  # told of the file
-        with open_picture(view.depth) as picture:
-            depth = np.array(picture)
-        where, figure = str(view.depth), alpha > 0.5
+    for view in views:
+        if view.depth is None or not view.depth.is_file():
+            continue
+        depth, broken = read_depth(view.depth)
+        yield from broken
+        if depth is None or view.key not in alphas:
+            continue
+        where, figure = str(view.depth), alphas[view.key] > 0.5
         if depth.shape != figure.shape:
             sizes = [" x ".join(map(str, one.shape[::-1])) for one in (depth, figure)]
             yield _finding("unequal sizes", where, f"{sizes[0]} pixels", f"{sizes[1]} as its picture has")

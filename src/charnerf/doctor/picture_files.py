@@ -53,34 +53,18 @@ def picture_findings(file: Path, size: tuple[int, int]) -> tuple[np.ndarray | No
         return None, [Finding("truncated file", str(file), found, "a picture that opens whole", fix)]
 
 
-def depth_file_findings(file: Path) -> list[Finding]:
-    """What is wrong with a depth picture's file."""
+def read_depth(file: Path) -> tuple[np.ndarray | None, list[Finding]]:
+    """A depth picture (H, W), millimetres, None where it can not be read, and what is wrong with its file."""
     try:
         with open_picture(file) as picture:
-            mode = picture.mode
-            picture.load()
+            if picture.mode in _DEPTH:
+                return np.array(picture), []
+            found = f"mode {picture.mode}"
     except (OSError, SyntaxError, ValueError) as error:
-        return [
-            Finding(
-                "truncated file",
-                str(file),
-                str(error),
-                "a picture that opens whole",
-                "Capture the character again.",
-            )
-        ]
-    if mode in _DEPTH:
-        return []
-    return [
-        Finding(
-            "wrong bit depth",
-            str(file),
-            f"mode {mode}",
-            "16-bit grey, millimetres",
-            "Capture it again.",
-            DEPTH_AGAIN,
-        )
-    ]
+        expected, fix = "a picture that opens whole", "Capture the character again."
+        return None, [Finding("truncated file", str(file), str(error), expected, fix)]
+    expected, fix = "16-bit grey, millimetres", "Capture it again."
+    return None, [Finding("wrong bit depth", str(file), found, expected, fix, DEPTH_AGAIN)]
 
 
 def duplicates(views: Sequence[View], pictures: Sequence[np.ndarray]) -> Iterator[Finding]:
