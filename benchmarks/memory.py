@@ -9,6 +9,7 @@ from typing import Literal
 import torch
 
 from charnerf.bench.subjects import Pictured
+from charnerf.errors import DependencyError
 from charnerf.evaluation.timing import Stopwatch, process_peak_mib
 from charnerf.geometry.cameras import pixel_centres
 from charnerf.geometry.resizing import resized_cameras
@@ -69,4 +70,8 @@ def _measure(
             else:
                 renderer.render_camera(renderer.prepared(scene), camera)
         peak = watch.peaks_mib().get("work", process_peak_mib())
+    if before is None or peak is None:
+        raise DependencyError(
+            "memory: this system does not tell how much a process holds, expected Linux or macOS."
+        )
     return PeakMemory(rise_mib=peak - before, seconds=watch.total_seconds("work"))

@@ -1,6 +1,7 @@
 """What all tests share: one seed, opt-in markers, the config folder."""
 
 import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import pytest
 import torch
 
+from charnerf.interruption import SIGNALS
 from charnerf.process import use_fastest_products
 from charnerf.types import SourceViews
 from support import helpers
@@ -39,6 +41,14 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def _products_of_doors() -> None:
     """As doors set them: the numbers must not depend on whether a test that runs a command came before."""
     use_fastest_products()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _signals_of_a_terminal() -> None:
+    """Heard, here and in what tests start: shells let background jobs, and nohup what it starts, ignore some."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 
 @pytest.fixture(autouse=True)

@@ -5,6 +5,7 @@ A door listens (`listening`); then a signal raises `Stopped`, which cleans up as
 """
 
 import logging
+import multiprocessing
 import os
 import signal
 import stat
@@ -144,10 +145,11 @@ def leave_signals_to_parent() -> None:
 @cache
 def end_with_parent() -> None:
     """Ask this process to end once its parent has, however that ended; what does not end then is ended."""
-    parent = os.getppid()
+    above, parent = os.getppid(), multiprocessing.parent_process()
 
     def watch() -> None:
-        while os.getppid() == parent:
+        # the process above may be one that starts others; the parent's pipe does not tell where others hold it too
+        while os.getppid() == above and (parent is None or parent.is_alive()):
             time.sleep(1.0)
         os.kill(os.getpid(), signal.SIGTERM)
         end = time.monotonic() + _PATIENCE

@@ -1,6 +1,7 @@
 """Data sets of generated characters: seeds, resuming."""
 
 import shutil
+from contextlib import contextmanager
 
 import pytest
 
@@ -9,6 +10,8 @@ from charnerf.capture.generated import SPLITS, Generator, character_seed, genera
 from charnerf.data.characters import load_character
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
+from charnerf.interruption import Stopped
+from tests.support.processes import ended_process
 
 SMALL = {"train": 1, "val": 0, "test": 1, "seed": 3, "views": 2, "size": 16}
 
@@ -49,6 +52,25 @@ def test_resuming_keeps_what_is_there_and_makes_the_rest(made, tmp_path, monkeyp
     assert info == read_dataset(root)
     one, other = ((base / "test-00000/images/000.png").read_bytes() for base in (made, root))
     assert one == other
+
+
+def test_a_stop_leaves_no_halves_and_lists_what_is_whole(made, tmp_path, monkeypatch):
+    """A worker was killed in the middle of a character while the other one ended a whole one."""
+    root = tmp_path / "set"
+
+    @contextmanager
+    def stopped(*_):
+        (root / f".partial-{ended_process()}-test-00000/images").mkdir(parents=True)
+        shutil.copytree(made / "train-00000", root / "train-00000")
+        raise Stopped(15)
+        yield
+
+    with monkeypatch.context() as patch, pytest.raises(Stopped):
+        patch.setattr(module, "in_processes", stopped)
+        generate_dataset(root, **SMALL, processes=2)
+    assert read_dataset(root).splits["train"] == ("train-00000",)
+    assert sorted(path.name for path in root.iterdir()) == [".generate.lock", "dataset.json", "train-00000"]
+    assert generate_dataset(root, **SMALL, processes=1).splits == read_dataset(made).splits
 
 
 def test_another_seed_setting_or_generator_does_not_mix(made):

@@ -13,10 +13,10 @@ from PIL import Image
 from charnerf.data.characters import (
     CharacterPictures,
     load_character,
-    remove_partial_characters,
     write_character,
 )
 from charnerf.data.layout import DatasetInfo, write_dataset
+from charnerf.data.partial import whole_characters
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import fibonacci_hemisphere, pixel_rays
 from charnerf.geometry.framing import framing_cameras, source_cameras
@@ -242,5 +242,5 @@ def test_a_killed_writer_leaves_no_character(tmp_path):
     assert done.returncode == -signal.SIGKILL
     left = [path.name for path in tmp_path.iterdir()]
     assert len(left) == 1 and left[0].startswith(".partial-")
-    remove_partial_characters(tmp_path)
-    assert list(tmp_path.iterdir()) == []
+    with whole_characters(tmp_path):
+        assert list(tmp_path.iterdir()) == []

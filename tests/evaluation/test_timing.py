@@ -1,12 +1,16 @@
 import mmap
+import sys
 import time
+from pathlib import Path
 from statistics import median
 
 import pytest
 import torch
 
+from charnerf.evaluation import metrics_file, timing
 from charnerf.evaluation.environment import environment
 from charnerf.evaluation.timing import Stopwatch, process_peak_mib
+from charnerf.reporting.metrics_shape import check_metrics
 
 
 def test_stages_report_medians_and_drop_what_raised():
@@ -33,6 +37,18 @@ def test_memory_of_a_stage_is_seen_after_it_was_freed():
     peaks = watch.peaks_mib()
     assert peaks["large"] > peaks["small"] + 0.8 * size
     assert process_peak_mib() > peaks["large"] - 64
+
+
+def test_memory_is_absent_where_the_system_does_not_tell(monkeypatch):
+    """On Windows there is no module `resource`, and no /proc."""
+    monkeypatch.setitem(sys.modules, "resource", None)
+    monkeypatch.setattr(timing, "_STATM", timing._STATM / "none")
+    with Stopwatch(torch.device("cpu")) as watch, watch.stage("work"):
+        pass
+    assert process_peak_mib() is None and watch.peaks_mib() == {}
+    found = metrics_file._memory([], torch.device("cpu"))
+    check_metrics({**found, "peak_memory_by_stage_mib": watch.peaks_mib()}, Path("metrics.json"))
+    assert found["peak_memory_mib"] is None and found["peak_memory_mib_reason"] == "the system does not tell"
 
 
 def test_environment_gives_the_commit_or_the_reason():

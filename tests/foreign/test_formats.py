@@ -4,7 +4,9 @@ import gzip
 import json
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +19,14 @@ from charnerf.data import json_values
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import read_dataset
 from charnerf.errors import ConfigError, DataError
+from charnerf.foreign import kept
 from charnerf.foreign.data import ForeignData
 from charnerf.foreign.kept import kept_copy, recognised
 from charnerf.foreign.reading import Reading
+from charnerf.interruption import Stopped
 from charnerf.types import Cameras
 from support import foreign_sets as sets
+from support.processes import ended_process
 
 TURNED = 25.0  # degrees about z, beside 0.3 of the size and a shift
 WRITERS = {
@@ -173,6 +178,21 @@ def test_what_is_kept_is_read_again_only_where_a_file_changed(foreign: Callable,
         "pose",
         "rgb",
     ]
+
+
+def test_what_a_killed_process_left_goes_when_the_reading_is_stopped(
+    foreign: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def stopped(work: partial, *_: object) -> Iterator[None]:
+        (work.keywords["home"] / f".partial-{ended_process()}-hero/images").mkdir(parents=True)
+        raise Stopped(15)
+        yield
+
+    monkeypatch.setattr(kept, "in_processes", stopped)
+    with pytest.raises(Stopped):
+        read(foreign("srn"), tmp_path, front=0)
+    assert [path.name for path in tmp_path.glob("*/*")] == [".read.lock"]
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,10 @@ from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
 from charnerf.capture.renderers.base import AbstractRenderer
 from charnerf.capture.variants import SEPARATOR, variant
-from charnerf.data.characters import CharacterPictures, remove_partial_characters, write_character
+from charnerf.data.characters import CharacterPictures, write_character
 from charnerf.data.layout import add_to_split, check_name
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.files import check_folder
-from charnerf.interruption import held
 from charnerf.progress import Progress
 from charnerf.surfaces.mesh_files import write_surface_mesh
 from charnerf.surfaces.surface_mesh import SurfaceMesh
@@ -226,7 +225,7 @@ def _check_call(
 
 
 def _make_room(root: Path, split: str, items: Sequence[_Item], note: Path) -> frozenset[str]:
-    """Make the data set's folder; names that are taken are refused, what killed captures left goes.
+    """Make the data set's folder; names that are taken are refused.
 
     Returns:
         Names that are there from the same capture, which was interrupted.
@@ -234,7 +233,6 @@ def _make_room(root: Path, split: str, items: Sequence[_Item], note: Path) -> fr
     names = [item.name for item in items]
     done = unfinished.there_already(root, split, names, note)
     root.mkdir(parents=True, exist_ok=True)
-    remove_partial_characters(root)
     return done
 
 
@@ -251,24 +249,20 @@ def _capture_items(
     items = [item for item in items if item.name not in skipped]
     outcomes: dict[_Item, _Outcome] = {}
     began = time.perf_counter()
-    try:
-        with Progress("capture") as progress, in_processes(work, items, processes) as results:
-            for item, outcome in results:
-                for note in outcome.notes:
-                    progress.say(f"{item.name}: {note}")
-                if outcome.failure is not None:
-                    progress.say(f"not captured: {outcome.failure}")
-                with held():
-                    if outcome.failure is None:
-                        add([item.name])
-                    outcomes[item] = outcome
-                pace = len(outcomes) / (time.perf_counter() - began)
-                progress.update(len(outcomes) / len(items), f"{pace:.3g} characters a second")
-    finally:  # interrupted: what was written meanwhile belongs to the data set too, what a process left half written does not
-        remove_partial_characters(root)
-        unlisted = [item.name for item in items if item not in outcomes and (root / item.name).is_dir()]
-        if unlisted:
-            add(unlisted)
+    with (
+        unfinished.listed_as_made(root, [item.name for item in items], add) as ended,
+        Progress("capture") as progress,
+        in_processes(work, items, processes) as results,
+    ):
+        for item, outcome in results:
+            for note in outcome.notes:
+                progress.say(f"{item.name}: {note}")
+            if outcome.failure is not None:
+                progress.say(f"not captured: {outcome.failure}")
+            ended(item.name, outcome.failure is None)
+            outcomes[item] = outcome
+            pace = len(outcomes) / (time.perf_counter() - began)
+            progress.update(len(outcomes) / len(items), f"{pace:.3g} characters a second")
     return CaptureReport(
         captured=tuple(item.name for item in items if outcomes[item].failure is None),
         failed=tuple(failure for item in items if (failure := outcomes[item].failure) is not None),

@@ -12,7 +12,7 @@ import trimesh
 from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_scene_to, made_by
 from charnerf.capture.parallel import in_processes
-from charnerf.data.characters import remove_partial_characters
+from charnerf.capture.unfinished import listed_as_made
 from charnerf.data.layout import DatasetInfo, add_to_split, open_or_new, read_dataset, write_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import locked
@@ -142,7 +142,6 @@ def _begin(root: Path, wanted: Sequence[tuple[str, int]], facts: dict[str, Any])
         raise DataError(
             f"{root}: holds a data set made otherwise ({keys}); name another folder or remove this one."
         )
-    remove_partial_characters(root)
     splits: dict[str, tuple[str, ...]] = {}
     for split in SPLITS:
         mine = {_name(*pair) for pair in wanted if pair[0] == split and (root / _name(*pair)).is_dir()}
@@ -161,11 +160,24 @@ def _make_missing(
     missing = [pair for pair in wanted if not (root / _name(*pair)).is_dir()]
     if not missing:
         return
-    with Progress("generate") as progress, in_processes(make, missing, processes) as made:
+    names, add = [_name(*pair) for pair in missing], partial(_add, root)
+    with (
+        listed_as_made(root, names, add) as ended,
+        Progress("generate") as progress,
+        in_processes(make, missing, processes) as made,
+    ):
         step = progress.counter(len(missing))
-        for (split, index), _ in made:
-            add_to_split(root, split, [_name(split, index)])
+        for pair, _ in made:
+            ended(_name(*pair), True)
             step()
+
+
+def _add(root: Path, names: Sequence[str]) -> None:
+    """Add characters to the splits that their names begin with."""
+    for split in SPLITS:
+        members = [name for name in names if name.startswith(f"{split}-")]
+        if members:
+            add_to_split(root, split, members)
 
 
 def _make(

@@ -1,20 +1,17 @@
 """Work in parallel processes that end with their parent."""
 
-import multiprocessing
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing.process import BaseProcess
 from typing import TypeVar
 
 import torch
 
 from charnerf.errors import DataError
-from charnerf.interruption import Stopped, listening
+from charnerf.interruption import Stopped, end_with_parent, listening
 from charnerf.pools import clean_processes
 
 Item = TypeVar("Item")
@@ -68,11 +65,4 @@ def _begin() -> None:
     """Use one thread, leave Ctrl-C to the parent, and end with that even if it is killed."""
     torch.set_num_threads(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
-
-
-def _end_after(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
+    end_with_parent()

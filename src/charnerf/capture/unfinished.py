@@ -1,14 +1,18 @@
-"""The note of a capture that is under way: where it is left, the capture was interrupted, and the same command goes on."""
+"""Captures under way: a note, by which the same command goes on with an interrupted one, and when characters are listed."""
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from charnerf.data.layout import DATASET_FILE, DatasetInfo, add_to_split, open_or_new, refuse_taken_names
+from charnerf.data.partial import whole_characters
 from charnerf.files import write_text
+from charnerf.interruption import held
+
+_LOT = 0.1  # of those listed: a list is written as a whole, so that lots of one would cost the square of their number
 
 
 def note_of(root: Path, files: Sequence[Path], *settings: Any) -> Path:
@@ -38,10 +42,11 @@ def there_already(root: Path, split: str, names: Sequence[str], note: Path) -> f
     ).exists() or not note.is_file()  # else it was killed before its first line
     info = open_or_new(root) if has_list else DatasetInfo(root=root, splits={}, made_by={})
     elsewhere = {name for other, members in info.splits.items() if other != split for name in members}
-    done = [name for name in names if note.is_file() and name not in elsewhere and (root / name).is_dir()]
+    goes_on = note.is_file()
+    done = {name for name in names if goes_on and name not in elsewhere and (root / name).is_dir()}
     refuse_taken_names(info, [name for name in names if name not in done])
-    unlisted = [name for name in done if name not in info.splits.get(split, ())]
-    if unlisted:  # it was killed between the two
+    unlisted = sorted(done.difference(info.splits.get(split, ())))
+    if unlisted:  # it was killed before it listed them
         add_to_split(root, split, unlisted)
     return frozenset(done)
 
@@ -52,3 +57,38 @@ def noted(note: Path, names: Sequence[str]) -> Iterator[None]:
     write_text(note, json.dumps(list(names)) + "\n")
     yield
     note.unlink(missing_ok=True)
+
+
+@contextmanager
+def listed_as_made(
+    root: Path, names: Sequence[str], add: Callable[[list[str]], object]
+) -> Iterator[Callable[[str, bool], None]]:
+    """A block whose processes write characters: however it ends, all that are whole are listed, and no others are left.
+
+    Args:
+        root: Folder of the data set.
+        names: The characters; none is there or listed yet.
+        add: Adds some to the data set's lists.
+
+    Yields:
+        To be called with each name that has come to its end, and whether it was made; such are listed in lots that grow with
+        their number.
+    """
+    ended: set[str] = set()
+    waiting: list[str] = []
+
+    def end(name: str, is_made: bool) -> None:
+        with held():  # a signal in between would leave one out, or list some twice
+            ended.add(name)
+            waiting.extend([name] if is_made else [])
+            if len(waiting) > _LOT * len(ended):
+                add(waiting)
+                waiting.clear()
+
+    try:
+        with whole_characters(root):
+            yield end
+    finally:
+        rest = [*waiting, *(name for name in names if name not in ended and (root / name).is_dir())]
+        if rest:
+            add(rest)

@@ -270,8 +270,9 @@ def _measure(
         "faces": options.faces,
         "texels": options.texture_size,
         **environment(heroes[0][1].views.images.device),
-        "peak_memory_mib": round(process_peak_mib()),
     }
+    if (peak := process_peak_mib()) is not None:
+        facts["peak_memory_mib"] = round(peak)
     text = score_text(rows, facts)
     write_text(output / "meshes.md", text)
     write_text(output / "meshes.json", json.dumps({"facts": facts, "characters": rows}, indent=2) + "\n")

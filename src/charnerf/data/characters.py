@@ -1,8 +1,6 @@
 """One character of a data set: its pictures, cameras, source views and mesh, read and written."""
 
 import difflib
-import os
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,7 @@ from PIL import Image
 from torch import Tensor
 
 from charnerf.data.layout import MESH_FILE, TRANSFORMS_FILE, check_name, read_dataset
+from charnerf.data.partial import character_aside
 from charnerf.data.shards import bring, is_cache
 from charnerf.data.transforms import read_transforms, transforms_text
 from charnerf.errors import DataError
@@ -24,7 +23,6 @@ from charnerf.types import Cameras, SourceViews
 MOST_NAMES = 12  # in a message
 
 DEPTH_FOLDER = "depth"
-_PARTIAL = ".partial-"
 
 
 @dataclass(frozen=True)
@@ -185,28 +183,13 @@ def write_character(
     target = root / name
     if target.exists():
         raise DataError(f"{target}: is there already; rename the character or remove that folder.")
-    aside = root / f"{_PARTIAL}{os.getpid()}-{name}"
-    shutil.rmtree(aside, ignore_errors=True)
-    try:
-        aside.mkdir(parents=True)  # in here: a signal that comes meanwhile is answered right behind it
+    with character_aside(root, name) as aside:
         _write_pictures(aside, pictures)
         if write_mesh is not None:
             mesh_file = aside / MESH_FILE
             mesh_file.parent.mkdir()
             write_mesh(mesh_file)
-        os.rename(aside, target)
-    except BaseException:
-        shutil.rmtree(aside, ignore_errors=True)
-        raise
     return target
-
-
-def remove_partial_characters(root: str | Path) -> None:
-    """Remove what killed processes left of characters they were writing; those of living processes stay."""
-    for folder in Path(root).glob(f"{_PARTIAL}*"):
-        writer = folder.name.removeprefix(_PARTIAL).split("-")[0]
-        if writer.isdigit() and not _is_alive(int(writer)):
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 def read_rgba(path: Path, size: tuple[int, int]) -> Tensor:
@@ -284,13 +267,3 @@ def _source_views(images: Tensor, cameras: Cameras) -> SourceViews:
 
 def _rank(name: str) -> tuple[int, str]:
     return (SOURCE_ORDER.index(name) if name in SOURCE_ORDER else len(SOURCE_ORDER), name)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True

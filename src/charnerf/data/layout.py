@@ -57,6 +57,11 @@ def check_name(kind: str, name: str) -> None:
         )
 
 
+def given_twice(names: Iterable[str]) -> list[str]:
+    """Names that stand there more than once, sorted."""
+    return sorted(name for name, count in Counter(names).items() if count > 1)
+
+
 def check_view_name(where: str, name: str) -> None:
     """Check that the name of a source view can be a file's.
 
@@ -125,8 +130,7 @@ def read_dataset(root: str | Path) -> DatasetInfo:
             raise DataError(f"{path}: splits.{split}: found {repr(names)[:60]}, expected a list of names.")
         for name in names:
             check_name(f"{path}: splits.{split}: character", name)
-        if len(set(names)) != len(names):
-            twice = sorted(name for name, count in Counter(names).items() if count > 1)
+        if twice := given_twice(names):
             raise DataError(
                 f"{path}: splits.{split}: found {', '.join(twice)} more than once; keep each name once."
             )
@@ -193,8 +197,7 @@ def refuse_taken_names(info: DatasetInfo, names: Iterable[str]) -> None:
     names = list(names)
     for name in names:
         check_name("character", name)
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
+    if twice := given_twice(names):
         raise DataError(f"{', '.join(twice)}: given more than once; names are file stems and must differ.")
     listed = {name: split for split, members in info.splits.items() for name in members}
     taken = [name for name in names if name in listed or (info.root / name).exists()]

@@ -22,6 +22,7 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 from charnerf.data.layout import DATASET_FILE, DatasetInfo, check_name, read_json, write_dataset
+from charnerf.data.partial import character_aside, whole_characters
 from charnerf.errors import DataError, DependencyError
 from charnerf.files import inside, locked, write_bytes, write_text
 
@@ -191,7 +192,7 @@ def bring(root: Path, name: str) -> None:
         with suppress(FileNotFoundError):  # it is on its way out
             _note_use(used)
             return
-    with locked(root / _LOCK):
+    with locked(root / _LOCK), whole_characters(root):
         if not ((root / name).is_dir() and used.is_file()):
             settings = read_json(root / CACHE_FILE)
             _make_room(root, index, float(settings["limit_mib"]) * 2**20 - shard.size)
@@ -244,10 +245,7 @@ def _unpack(root: Path, shard: Shard, content: bytes) -> None:
             f"{where}: found {len(samples)} characters, expected {len(shard.names)}; pack the data set again."
         )
     for name, members in zip(shard.names, samples, strict=True):
-        aside = root / f".partial-{os.getpid()}-{name}"
-        shutil.rmtree(aside, ignore_errors=True)
-        try:
-            aside.mkdir()
+        with character_aside(root, name) as aside:
             for member, body in members.items():
                 file = inside(aside, member, where)
                 try:
@@ -258,9 +256,6 @@ def _unpack(root: Path, shard: Shard, content: bytes) -> None:
                         f"{where}: found {member[:200]!r} as a file and as a folder, expected one of them."
                     ) from error
             shutil.rmtree(root / name, ignore_errors=True)
-            aside.rename(root / name)
-        finally:
-            shutil.rmtree(aside, ignore_errors=True)
 
 
 def _samples(content: bytes, where: str) -> Iterator[dict[str, bytes]]:

@@ -95,14 +95,17 @@ def _median_seconds(results: Sequence[CharacterResult], stage: str) -> float | N
 
 
 def _memory(results: Sequence[CharacterResult], device: torch.device) -> dict[str, Any]:
-    """Peak memory of all, and of each stage of ours, MiB."""
+    """Peak memory of all, and of each stage of ours, MiB; null with the reason, and no stages, where the system does not tell."""
     peaks: dict[str, float] = {}
     for result in results:
         for stage, peak in result.peaks_mib.items():
             peaks[stage] = max(peaks.get(stage, 0.0), peak)
     whole = max(peaks.values(), default=0.0) if device.type == "cuda" else process_peak_mib()
     stages = {stage: peaks[stage] for stage in ("encode", "render", "mesh") if stage in peaks}
-    return {"peak_memory_mib": whole, "peak_memory_by_stage_mib": stages}
+    memory: dict[str, Any] = {"peak_memory_mib": whole, "peak_memory_by_stage_mib": stages}
+    if whole is None:
+        memory["peak_memory_mib_reason"] = "the system does not tell"
+    return memory
 
 
 def _left_out(left_out: LeftOut) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Seconds and memory of the stages: devices are synchronised."""
 
 import os
-import resource
 import sys
 import threading
 import time
@@ -24,8 +23,12 @@ def synchronize(device: torch.device) -> None:
         torch.cuda.synchronize(device)
 
 
-def process_peak_mib() -> float:
-    """Largest resident memory of this process so far, MiB."""
+def process_peak_mib() -> float | None:
+    """Largest resident memory of this process so far, MiB; None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / _MIB if sys.platform == "darwin" else peak / 1024.0
 

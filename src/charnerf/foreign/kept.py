@@ -8,8 +8,9 @@ from functools import partial
 from pathlib import Path
 
 from charnerf.capture.parallel import in_processes
-from charnerf.data.characters import remove_partial_characters, write_character
-from charnerf.data.layout import DATASET_FILE, DatasetInfo, write_dataset
+from charnerf.data.characters import write_character
+from charnerf.data.layout import DATASET_FILE, DatasetInfo, given_twice, write_dataset
+from charnerf.data.partial import whole_characters
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.files import cache_folder, locked, write_text
 from charnerf.foreign.base import AbstractFormat, Found
@@ -45,13 +46,7 @@ def recognised(root: Path) -> tuple[AbstractFormat, list[Found]]:
     for one in FORMATS:
         found = one.characters(root)
         if found:
-            names = [character.name for character in found]
-            twice = (
-                sorted({name for name in names if names.count(name) > 1})
-                if len(set(names)) < len(names)
-                else []
-            )
-            if twice:
+            if twice := given_twice(character.name for character in found):
                 raise DataError(
                     f"{root}: found {', '.join(twice[:5])} more than once, expected one folder a name; rename them."
                 )
@@ -77,8 +72,7 @@ def kept_copy(
     form, found = recognised(root)
     home = cache_folder(cache) / _folder_name(root, reading)
     home.mkdir(parents=True, exist_ok=True)
-    with locked(home / _LOCK):  # one process reads, others wait
-        remove_partial_characters(home)
+    with locked(home / _LOCK), whole_characters(home):  # one process reads, others wait
         work = partial(_keep, home=home, form=form, reading=reading)
         errors = []
         with Progress(f"read {root.name}") as progress, in_processes(work, found, processes) as results:
