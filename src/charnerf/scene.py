@@ -36,7 +36,7 @@ class AbstractColoring(ABC):
 
     @abstractmethod
     def rgb_of(self, points: Tensor, appearance: Tensor) -> Tensor:
-        """Colours (P, ..., 3) of points (P, 3) of appearances (P, ..., C)."""
+        """Colours (3, ..., P) of points (P, 3) of appearances (C, ..., P)."""
 
     @abstractmethod
     def at_width(self, width: int) -> "AbstractColoring":

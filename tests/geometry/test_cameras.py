@@ -15,6 +15,7 @@ from charnerf.geometry.cameras import (
     look_at,
     mirror_cameras,
     pixel_centres,
+    pixel_planes,
     pixel_rays,
     project,
     project_into_all,
@@ -70,6 +71,9 @@ def test_projection_and_rays_are_inverse(seed, orthographic, double):
     torch.testing.assert_close(all_pixels[same, same], back, atol=10 * tolerance, rtol=0)
     torch.testing.assert_close(all_depths[same, same], depth, atol=tolerance, rtol=0)
     assert torch.equal(all_front[same, same], in_front)
+    torch.testing.assert_close(
+        pixel_planes(cameras, points), all_pixels.permute(1, 2, 0), atol=10 * tolerance, rtol=0
+    )
 
 
 @pytest.mark.parametrize("orthographic", [False, True])
@@ -187,6 +191,7 @@ def test_points_on_and_behind_the_plane_are_masked_and_finite():
     pixels, depth, in_front = project_into_all(cameras, points)
     (gradient,) = torch.autograd.grad(pixels.sum() + depth.sum(), points)
     assert not in_front.any() and pixels.isfinite().all() and gradient.isfinite().all()
+    assert pixel_planes(cameras, points).isfinite().all()
     directions = directions_to_points(cameras, points)
     (gradient,) = torch.autograd.grad(directions.sum(), points)
     assert directions.isfinite().all() and gradient.isfinite().all()

@@ -236,6 +236,19 @@ def project_into_all(cameras: Cameras, points: Tensor) -> tuple[Tensor, Tensor, 
     return _project_local(cameras, turned - offset)
 
 
+def pixel_planes(cameras: Cameras, points: Tensor) -> Tensor:
+    """Pixels (V, 2, P) of points (P, 3) in cameras (V,), as `project_into_all`, x and y one after the other: passes over memory."""
+    axes = cameras.world_from_camera[:, :3, :3].mT  # (V, 3 camera, 3 world)
+    offset = (axes * cameras.world_from_camera[:, None, :3, 3]).sum(-1)
+    turned = torch.addmm(-offset.reshape(-1, 1), axes.reshape(-1, 3), points.t()).unflatten(0, (-1, 3))
+    depth = -turned[:, 2]
+    divisor = torch.where(cameras.orthographic[:, None] | (depth <= 1e-6), 1.0, depth)
+    scale = cameras.focal * cameras.focal.new_tensor((1.0, -1.0))
+    return torch.addcmul(
+        cameras.principal_point[..., None], turned[:, :2] / divisor[:, None], scale[..., None]
+    )
+
+
 def directions_to_points(cameras: Cameras, points: Tensor) -> Tensor:
     """Unit directions (P, V, 3) from cameras (V,) to points (P, 3): of an orthographic camera its viewing axis."""
     along_axis = -cameras.world_from_camera[:, :3, 2]

@@ -5,7 +5,7 @@ from typing import final
 
 from torch import Tensor
 
-from charnerf.geometry.cameras import project_into_all
+from charnerf.geometry.cameras import pixel_planes
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.view_maps import Pictures
 from charnerf.scene import AbstractColoring
@@ -32,12 +32,11 @@ class DrawnColoring(AbstractColoring, MovableRecord):
     pictures: Pictures
 
     def rgb_of(self, points: Tensor, appearance: Tensor) -> Tensor:
-        """Colours (P, ..., 3) of points (P, 3) of appearances (P, ..., C): the drawings are read once a point."""
-        pixels, _, _ = project_into_all(self.cameras, points)
-        uv = pixels / pixels.new_tensor((self.cameras.width, self.cameras.height))
-        drawn, flat = self.pictures.read(uv), appearance.reshape(-1, appearance.shape[-1])
-        rgb = self.head.rgb_of(flat, drawn.repeat_interleave(len(flat) // max(1, len(drawn)), dim=0))
-        return rgb.view(*appearance.shape[:-1], 3)
+        """Colours (3, ..., P) of points (P, 3) of appearances (C, ..., P): the drawings are read once a point."""
+        size = points.new_tensor((self.cameras.width, self.cameras.height))
+        drawn = self.pictures.read_planes(pixel_planes(self.cameras, points) / size[:, None])
+        between = [1] * (appearance.ndim - 2)
+        return self.head.rgb_planes(appearance, drawn.view(*drawn.shape[:2], *between, -1))
 
     def at_width(self, width: int) -> "DrawnColoring":
         """By the detailed drawings, so many pixels wide; by the encoded ones where those are as wide."""

@@ -214,6 +214,12 @@ class Pictures(MovableRecord):
         own = bilinear_rows(uv * uv.new_tensor(self.size), width=width, height=height)
         return read_rows(self.rows, *own).unflatten(0, uv.shape[:2])
 
+    def read_planes(self, uv: Tensor) -> Tensor:
+        """The same (V, 3, P) at places (V, 2, P)."""
+        at = (2.0 * uv - 1.0).transpose(1, 2)[:, :, None]  # from -1 to 1
+        read = F.grid_sample(self.images, at, mode="bilinear", padding_mode="border", align_corners=False)
+        return read[..., 0]
+
 
 def _with_hull_maps(
     pictures: Tensor, hull: Hull | None, present: Tensor

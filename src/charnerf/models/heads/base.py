@@ -36,3 +36,8 @@ class AbstractHead(nn.Module, ABC):
     @abstractmethod
     def rgb_of(appearance: Tensor, drawn: Tensor) -> Tensor:
         """Colours (P, 3), in [0, 1], of that (P, C) and of the drawings' own colours there (P, V, 3); no weight takes part."""
+
+    @staticmethod
+    @abstractmethod
+    def rgb_planes(appearance: Tensor, drawn: Tensor) -> Tensor:
+        """The same colours (3, ..., P) of (C, ..., P) and (V, 3, ..., P): for many points, in passes over memory."""

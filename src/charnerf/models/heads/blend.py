@@ -56,3 +56,12 @@ class BlendHead(AbstractHead):
         logits, free = appearance[:, :-4], appearance[:, -4:]
         blended = (torch.softmax(logits, dim=-1)[..., None] * drawn).sum(1)
         return blended + torch.sigmoid(free[:, 3:]) * (torch.sigmoid(free[:, :3]) - blended)
+
+    @staticmethod
+    def rgb_planes(appearance: Tensor, drawn: Tensor) -> Tensor:
+        """The same, view by view."""
+        shares, free = torch.softmax(appearance[:-4], dim=0), torch.sigmoid(appearance[-4:])
+        blended = shares[0] * drawn[0]
+        for share, colors in zip(shares[1:], drawn[1:], strict=True):
+            blended.addcmul_(share, colors)
+        return torch.addcmul(blended, free[3:], free[:3] - blended)

@@ -33,3 +33,8 @@ class RadianceHead(AbstractHead):
     def rgb_of(appearance: Tensor, drawn: Tensor) -> Tensor:
         """Their sigmoid."""
         return torch.sigmoid(appearance)
+
+    @staticmethod
+    def rgb_planes(appearance: Tensor, drawn: Tensor) -> Tensor:
+        """Their sigmoid."""
+        return torch.sigmoid(appearance)

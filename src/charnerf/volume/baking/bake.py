@@ -345,8 +345,9 @@ def _colors(scene: Scene, coarse: _Coarse, on_points: Callable[[int], None]) -> 
         parts = field.appearance(some, directions)  # (P, K, C)
         coefficients = torch.einsum("bk,pkc->pbc", into, parts)
         fitted = torch.einsum("kb,pbc->pkc", back, coefficients)
-        off = (coloring.rgb_of(some, parts) - coloring.rgb_of(some, fitted)).abs().amax(-1)
-        rows.append(torch.cat((coefficients.flatten(1), off.square().mean(-1, keepdim=True).sqrt()), dim=-1))
+        exact, kept = (coloring.rgb_of(some, one.transpose(0, 2).contiguous()) for one in (parts, fitted))
+        off = (exact - kept).abs().amax(0).square().mean(0).sqrt()  # (P,)
+        rows.append(torch.cat((coefficients.flatten(1), off[:, None]), dim=-1))
         on_points(COLOR_COST * len(some))
     filled = torch.cat((torch.zeros_like(rows[0][:1]), *rows))
     filled[1:, -1] += _missed_between(scene, coarse, index, filled)[wanted]
@@ -370,7 +371,9 @@ def _missed_between(scene: Scene, coarse: _Coarse, index: Tensor, rows: Tensor) 
     points, size = coarse.lattice.points(middles), points_at_once(field)
     found = combined(interpolated(index, rows, middles)[:, :-1], polynomials(inward))
     pieces = zip(points.split(size), inward.split(size), found.split(size), strict=True)
-    off = [(coloring.rgb_of(at, by) - field(at, along).rgb).abs().amax(-1) for at, along, by in pieces]
+    off = [
+        (coloring.rgb_of(at, by.t()).t() - field(at, along).rgb).abs().amax(-1) for at, along, by in pieces
+    ]
     errors = densities.new_zeros(densities.shape)
     errors[:-1, :-1, :-1][cells] = torch.cat(off)
     return _largest_before(errors)  # the cells around a point begin at it or a step before

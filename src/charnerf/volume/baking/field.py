@@ -77,7 +77,7 @@ class BakedField(AbstractField):
         for some, along in zip(points.split(AT_ONCE), view_dirs.split(AT_ONCE), strict=True):
             at = (some - self.grid.origin) / self.grid.pitch
             appearance, error = self.grid.read_colors(at, polynomials(along))
-            rgb.append(self.paint.rgb_of(some, appearance))
+            rgb.append(self.paint.rgb_of(some, appearance.t().contiguous()).t())
             errors.append(error)
         return torch.cat(rgb), torch.cat(errors)
 
