@@ -51,19 +51,18 @@ def test_an_installed_package_trains_by_its_own_config_files(tmp_path: Path) -> 
     empty = tmp_path / "empty"
     empty.mkdir()
 
-    def train(*arguments: str) -> str:
-        done = subprocess.run(
-            [sys.executable, "-m", "charnerf", "train", *arguments],
-            capture_output=True,
-            text=True,
-            check=True,
-            cwd=empty,
-            env={**os.environ, "PYTHONPATH": str(package.parent)},
-        )
-        return done.stdout
-
-    assert "image_size: 32" in train("scale=smoke", "--cfg", "job", "--package", "scale")
-    assert "combinator: learned, mean, sa, view_mha" in train("--help")
+    composed, described = ["scale=smoke", "--cfg", "job", "--package", "scale"], ["--help"]
+    code = f"from charnerf.cli import run; run(['train', *{composed}]); run(['train', *{described}])"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=empty,
+        env={**os.environ, "PYTHONPATH": str(package.parent)},
+    )
+    assert "image_size: 32" in done.stdout
+    assert "combinator: learned, mean, sa, view_mha" in done.stdout
     assert not list(empty.iterdir())
 
 

@@ -12,6 +12,7 @@ from charnerf.capture.dataset import capture_dataset
 from charnerf.config.options import option
 from charnerf.data.characters import load_character
 from charnerf.data.layout import names_of, read_dataset
+from charnerf.drawings import redrawn as redrawing
 from charnerf.drawings.artist import LEVELS, PAPER, draw_character, write_drawings
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.redrawn import VIEW_SHARES, redrawn, with_drawn_sources
@@ -27,6 +28,12 @@ AS_DRAWN = ReadingOptions(reconciled=False)
 @pytest.fixture(scope="module")
 def character(figure_dataset):
     return load_character(figure_dataset, names_of(read_dataset(figure_dataset), "train")[0])
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Drawings of fewer pixels than are made for training."""
+    monkeypatch.setattr(redrawing, "SIDE", 160)
 
 
 def test_drawings_have_the_size_that_is_asked_for_and_lie_on_paper(character):
@@ -76,7 +83,7 @@ def test_views_differ_more_from_level_to_level(character):
         draw_character(character, size=64, seed=1, level=4)
 
 
-def test_a_redrawn_character_keeps_its_truth(character):
+def test_a_redrawn_character_keeps_its_truth(character, small):
     """Other source views of the model's size, the same targets; level 0 is the character itself."""
     assert redrawn(character, level=0, seed=0, size=64) is character
     again = redrawn(character, level=2, seed=0, size=64)
@@ -88,7 +95,7 @@ def test_a_redrawn_character_keeps_its_truth(character):
     assert not torch.equal(loose[2, 3], loose[0, 3].flip(-1))
 
 
-def test_other_views_are_drawn_of_the_mesh(character):
+def test_other_views_are_drawn_of_the_mesh(character, small):
     """In the order given, the first of which rules; of the left one the picture that was captured, but for paper and framing."""
     views = [viewpoint(name) for name in ("left", "front", "right", "45")]
     again = redrawn(character, level=0, seed=0, size=64, views=views)
@@ -100,7 +107,7 @@ def test_other_views_are_drawn_of_the_mesh(character):
         redrawn(replace(character, mesh_file=None), level=1, seed=0, size=64, views=[viewpoint("right")])
 
 
-def test_training_characters_get_drawings_of_some_usual_views(character, figure_dataset, tmp_path):
+def test_training_characters_get_drawings_of_some_usual_views(character, small, tmp_path):
     """Copies of a mesh: their targets are as captured, their source views drawn, and the seed says how."""
     mesh = tmp_path / "figure.obj"
     surface = load_surface_mesh(character.mesh_file)

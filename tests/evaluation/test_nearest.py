@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 import torch
+from PIL import Image
 
 from charnerf.cli.evaluate import split_of
 from charnerf.data.characters import load_character
@@ -13,7 +14,7 @@ from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.nearest import NearestBaseline, TrainingCharacters, filled_drawings
 from charnerf.evaluation.scores import METRIC_KEYS
 from charnerf.pictures import on_white
-from support.figures import HullModel, HullRenderer, WhiteRenderer, write_figure
+from support.figures import BlindModel, WhiteRenderer, write_figure
 
 
 @pytest.fixture(scope="module")
@@ -80,9 +81,9 @@ def test_evaluation_fills_every_metric_and_says_why_where_it_can_not(training, f
         shutil.rmtree(folder / "mesh")
 
     def measure(known):
-        model, renderer = HullModel(), WhiteRenderer()
-        options = {"views": 2, "training": known}
-        return evaluate(model, renderer, figure_dataset, "test", **options)["baselines"]["nearest"]
+        options = {"views": 1, "training": known}
+        found = evaluate(BlindModel(), WhiteRenderer(), figure_dataset, "test", **options)
+        return found["baselines"]["nearest"]
 
     found = measure(TrainingCharacters([(training, "test")]))
     assert all(found[key] is not None for key in METRIC_KEYS if key != "lpips_vgg")
@@ -102,11 +103,13 @@ def test_evaluation_fills_every_metric_and_says_why_where_it_can_not(training, f
 
 def test_a_sheet_shows_it(training, figure_dataset, tmp_path):
     known = TrainingCharacters([(training, "test")])
-    arguments = (HullModel(), HullRenderer(), figure_dataset, "test")
-    for name, nearest in (("with", known), ("without", None)):
-        evaluate(*arguments, views=1, output=tmp_path / name, training=nearest)
-    sizes = [(tmp_path / name / "images/doll/sheet.png").stat().st_size for name in ("with", "without")]
-    assert sizes[0] > sizes[1]
+    arguments = (BlindModel(), WhiteRenderer(), figure_dataset, "test")
+    evaluate(*arguments, views=1, output=tmp_path / "with", training=known)
+    evaluate(*arguments, views=1, output=tmp_path / "without", baselines=False)
+    with_both, without = (
+        Image.open(tmp_path / name / "images/doll/sheet.png").height for name in ("with", "without")
+    )
+    assert with_both - without == 2 * 96, "a row of the hull's pictures and one of the nearest's"
     rows = (tmp_path / "with/views.csv").read_text().splitlines()
     assert sum(row.startswith("nearest,") for row in rows) == 2
 

@@ -2,7 +2,6 @@
 
 import logging
 import multiprocessing
-import subprocess
 import sys
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -23,6 +22,7 @@ from charnerf.training.run import run_training
 from charnerf.training.run_lock import RunLock
 from support import small_runs
 
+SILENT = ("hydra/job_logging=none", "hydra/hydra_logging=none")  # these would stay for other tests
 SMALL = ("encoder=single", "scale.steps=4", "validation.times=4")
 
 
@@ -155,7 +155,7 @@ def test_a_checkpoint_that_does_not_say_whose_it_is_begins_nothing(figure_datase
 def test_what_was_typed_is_kept_once_a_run_is_accepted(figure_dataset, tmp_path, monkeypatch, capsys):
     """Hydra would write it before the run is refused, and print all overrides before the message."""
     typed = ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={figure_dataset}", "ckpt_path=last"]
-    typed += [f"hydra.run.dir={tmp_path}", "hydra/job_logging=none", "hydra/hydra_logging=none"]
+    typed += [f"hydra.run.dir={tmp_path}", *SILENT]
     monkeypatch.setattr(sys, "argv", ["train.py"])
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
     with monkeypatch.context() as patch:
@@ -198,21 +198,26 @@ def test_a_run_that_can_not_write_its_checkpoint_fails(figure_dataset, tmp_path,
     assert not (tmp_path / "weights.safetensors").exists()
 
 
-def test_a_disk_that_takes_no_checkpoint_is_one_message_and_status_1(figure_dataset, tmp_path):
+def test_a_disk_that_takes_no_checkpoint_is_one_message_and_status_1(
+    figure_dataset, tmp_path, capsys, monkeypatch
+):
     """The kernel refuses every file above 100 kB."""
     resource = pytest.importorskip("resource")
-    settings = ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={figure_dataset}", *SMALL]
-    done = subprocess.run(
-        [sys.executable, "-m", "charnerf", "train", *settings, f"hydra.run.dir={tmp_path / 'run'}"],
-        capture_output=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
-    )
-    assert done.returncode == 1, done.stderr
-    errors = [line for line in done.stderr.decode().splitlines() if line.startswith("error: ")]
-    assert len(errors) == 1, done.stderr
+    monkeypatch.setattr(sys, "argv", ["train.py"])
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    settings = ["scale=smoke", "trainer=cpu", "data=folder", f"data.root={figure_dataset}", *SMALL, *SILENT]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
+    try:
+        status = train([*settings, f"hydra.run.dir={tmp_path / 'run'}"])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    told = capsys.readouterr().err
+    assert status == 1, told
+    errors = [line for line in told.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1, told
     assert "the checkpoint can not be written (File too large)" in errors[0]
-    assert b"Traceback" not in done.stderr
+    assert "Traceback" not in told
     assert not list((tmp_path / "run/checkpoints").iterdir())
 
 

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 
 import lightning as L
@@ -36,6 +37,19 @@ class Asking(L.Callback):
             os.kill(os.getpid(), signal.SIGTERM)
 
 
+@pytest.fixture(scope="module")
+def straight_run(figure_dataset, tmp_path_factory):
+    """By settings, a run that nothing stops, and its folder; made once."""
+
+    @cache
+    def made(*settings: str) -> tuple[small_runs.SmallRun, Path]:
+        folder = tmp_path_factory.mktemp("straight")
+        cfg = small_runs.smoke_config(figure_dataset, *SMALL, *settings)
+        return small_runs.assemble(cfg, folder).fit(), folder
+
+    return made
+
+
 @pytest.mark.parametrize(
     ("settings", "step", "in_validation", "done"),
     [
@@ -46,10 +60,10 @@ class Asking(L.Callback):
     ],
 )
 def test_a_run_that_is_stopped_goes_on_as_the_straight_one(
-    figure_dataset, tmp_path, caplog, settings, step, in_validation, done
+    figure_dataset, tmp_path, caplog, straight_run, settings, step, in_validation, done
 ):
     cfg = small_runs.smoke_config(figure_dataset, *SMALL, *settings)
-    straight = small_runs.assemble(cfg, tmp_path / "straight").fit()
+    straight, straight_folder = straight_run(*settings)
     stopped = small_runs.assemble(cfg, tmp_path / "run")
     stopped.trainer.callbacks.insert(1, Asking(step=step, in_validation=in_validation))
     with pytest.raises(Stopped) as stop, listening(), held():
@@ -62,7 +76,9 @@ def test_a_run_that_is_stopped_goes_on_as_the_straight_one(
     resumed = small_runs.assemble(cfg, tmp_path / "run").fit(checkpoint)
     assert resumed.recorder.losses == straight.recorder.losses[done:]
     assert torch.equal(small_runs.weights(resumed.module.model), small_runs.weights(straight.module.model))
-    curves = [(tmp_path / name / "curve.csv").read_text().splitlines() for name in ("straight", "run")]
+    curves = [
+        (folder / "curve.csv").read_text().splitlines() for folder in (straight_folder, tmp_path / "run")
+    ]
     assert [row.split(",")[0] for row in curves[0]] == [row.split(",")[0] for row in curves[1]]
 
 

@@ -29,13 +29,12 @@ def test_workers_make_the_same_run(figure_dataset, tmp_path):
             small_runs.smoke_config(figure_dataset, *SETTINGS, f"batches.workers={workers}"),
             tmp_path / str(workers),
         ).fit()
-        for workers in (0, 1, 2)
+        for workers in (0, 2)
     ]
-    alone, ahead, _ = runs
-    for one in runs[1:]:
-        assert one.recorder.batches == alone.recorder.batches and len(alone.recorder.batches) == 6
-        assert one.recorder.losses == alone.recorder.losses
-        assert torch.equal(small_runs.weights(one.module.model), small_runs.weights(alone.module.model))
+    alone, ahead = runs
+    assert ahead.recorder.batches == alone.recorder.batches and len(alone.recorder.batches) == 6
+    assert ahead.recorder.losses == alone.recorder.losses
+    assert torch.equal(small_runs.weights(ahead.module.model), small_runs.weights(alone.module.model))
     # its characters are opened there alone, once for all epochs
     assert alone.data.train_store._open and not ahead.data.train_store._open
 

@@ -128,7 +128,8 @@ def _hand(images: Tensor, style: DrawingStyle, generator: torch.Generator) -> Te
 def _largest(maps: Tensor, radius: int) -> Tensor:
     if radius == 0:
         return maps
-    return F.max_pool2d(maps, 2 * radius + 1, stride=1, padding=radius)
+    columns = F.max_pool2d(maps, (2 * radius + 1, 1), stride=1, padding=(radius, 0))
+    return F.max_pool2d(columns, (1, 2 * radius + 1), stride=1, padding=(0, radius))
 
 
 def _smallest(maps: Tensor, radius: int) -> Tensor:
