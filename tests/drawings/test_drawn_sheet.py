@@ -87,6 +87,20 @@ def test_figures_are_found_and_the_rest_is_left_aside(lines, jpeg_noise):
     assert ("a line" in reasons) == lines
 
 
+def test_edges_of_a_figure_are_no_lines_though_they_run_on_through_its_trunk():
+    page = np.full((300, 600, 3), 255, np.uint8)
+    for left in (100, 300):
+        page[60:215, left : left + 40] = (60, 90, 160)  # a trunk, taller than a line is long
+        page[215:240, left : left + 4] = (60, 90, 160)  # a thin leg below it, in the same columns
+    found = find_figures(drawing_from_array(page, "sheet"))
+    assert not [one for one in found.left_aside if one.reason == "a line"]
+    page[148:150] = (150, 150, 200)
+    lines = [
+        one for one in find_figures(drawing_from_array(page, "sheet")).left_aside if one.reason == "a line"
+    ]
+    assert sum(right - left for left, _, right, _ in (one.box for one in lines)) > 400
+
+
 def test_two_rows_are_read_row_by_row():
     pixels, boxes = sheet(["front", "side", "back", "right"], rows=2)
     found = find_figures(drawing_from_array(pixels, "sheet"))
@@ -139,6 +153,20 @@ def test_views_are_named_wherever_they_stand(order):
     assert [one.name for one in naming.viewpoints] == [names.get(view, view) for view in order]
 
 
+def test_front_and_back_that_show_as_much_are_asked_about():
+    front, side, back = (np.array(figure(view, 300)) for view in ("front", "side", "back"))
+
+    def named(*pictures: np.ndarray) -> Naming:
+        cut = [cut_out(drawing_from_array(one, "hero")).rgba for one in pictures]
+        return name_views(on_one_scale(cut, ["hero"] * len(cut), 96))
+
+    told, alike = named(back, front), named(front, front[:, ::-1])
+    assert [one.name for one in told.viewpoints] == ["back", "front"] and not told.is_doubtful
+    assert [one.name for one in alike.viewpoints] == ["front", "back"] and alike.is_doubtful
+    four = named(front, np.array(figure("right", 300)), back, side)
+    assert [one.name for one in four.viewpoints] == ["front", "right", "back", "left"]
+
+
 def test_names_and_angles_of_views():
     assert viewpoint("back") == Viewpoint(180.0) and viewpoint("right").azimuth_deg == 270.0
     assert viewpoint("45,20") == Viewpoint(45.0, 20.0) and viewpoint(-90).name == "right"
@@ -154,6 +182,7 @@ def test_a_sheet_is_read_whole():
     pixels, _ = sheet(["front", "side", "back"], lines=True)
     read = read_sheet(pixels)
     assert [view.name for view in read.drawings] == ["front", "left", "back"]
+    assert read.views == tuple(read.drawings) and len(read.sheet.figures) == 3
     assert "3 figures" in read.assumptions[0] and "1 front, 2 left, 3 back" in read.assumptions[0]
     assert "a swatch or a panel (4)" in read.assumptions[1] and not read.warnings
     assert (read.picture == (220, 40, 40)).all(-1).sum() > 500

@@ -31,12 +31,16 @@ class SheetViews:
 
     Attributes:
         drawings: RGBA (H, W, 4) by where they are seen from; front first, then sides, then back.
+        sheet: What was found, figures in reading order.
+        views: What each of these figures was taken for; None for one that is left out.
         assumptions: What was taken for what, sentences.
         warnings: What is doubtful, with what to type instead.
         picture: RGB uint8 (H, W, 3): the sheet with its figures numbered and named, and what was left aside.
     """
 
     drawings: dict[Viewpoint, np.ndarray]
+    sheet: Sheet
+    views: tuple[Viewpoint | None, ...]
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
     picture: np.ndarray
@@ -78,6 +82,8 @@ def read_sheet(
     chosen.sort(key=lambda pair: pair[0].rank)
     return SheetViews(
         drawings={view: sheet.figures[index].drawing.rgba for view, index in chosen},
+        sheet=sheet,
+        views=tuple(views[index] for index in range(count)),
         assumptions=(
             f"{drawing.name}: {count} figures, from the left, row by row: "
             + ", ".join(f"{index + 1} {_name(view)}" for index, view in views.items())

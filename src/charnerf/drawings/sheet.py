@@ -21,6 +21,9 @@ LINE_LENGTH = (
     0.35  # share of the sheet's side beyond which a thin straight run is a construction line or a frame
 )
 LINE_WIDTH = 0.006
+LINE_SHARE = (
+    0.2  # of such a run that is thin; the rest lies across figures, whose own edges are thin in a few pixels
+)
 LEAST_HEIGHT = 0.5  # of the tallest candidate's: what is smaller is a detail, a swatch or text
 ALIKE = 0.2  # relative difference of heights within which figures are drawn at one scale
 SOLID = 0.93  # share of its box that a swatch or a frame fills
@@ -116,24 +119,22 @@ def _without_lines(ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     thickest = max(2, round(LINE_WIDTH * max(ink.shape)))
     for axis in (0, 1):
         along = ink if axis else ink.T
-        length = max(8, round(LINE_LENGTH * along.shape[1]))
-        straight = _runs_at_least(along, length)
-        thick = ndimage.binary_opening(along, structure=np.ones((thickest + 1, 1), dtype=bool))
-        thin = straight & ~thick
+        thin = _thin_runs(along, max(8, round(LINE_LENGTH * along.shape[1])), thickest)
         lines |= thin if axis else thin.T
     return ink & ~lines, lines
 
 
-def _runs_at_least(mask: np.ndarray, length: int) -> np.ndarray:
-    """Pixels of a mask in horizontal runs of at least a length; gaps of two pixels (JPEG noise) do not end a run."""
+def _thin_runs(mask: np.ndarray, length: int, thickest: int) -> np.ndarray:
+    """Thin pixels of a mask's straight horizontal runs of at least a length; gaps of two pixels (JPEG noise) do not end a run."""
     closed = ndimage.binary_closing(mask, structure=np.ones((1, 3), dtype=bool))
+    thin = mask & ~ndimage.binary_opening(mask, structure=np.ones((thickest + 1, 1), dtype=bool))
     runs = np.zeros_like(mask)
     for row in np.flatnonzero(closed.sum(axis=1) >= length):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], closed[row].astype(np.int8), [0]))))
         for start, end in zip(edges[::2], edges[1::2], strict=True):
-            if end - start >= length:
+            if end - start >= length and thin[row, start:end].sum() >= LINE_SHARE * (end - start):
                 runs[row, start:end] = True
-    return runs & mask
+    return runs & thin
 
 
 def _choose(regions: Sequence[object]) -> tuple[list[int], dict[int, str]]:
