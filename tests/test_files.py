@@ -6,7 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.files import cache_folder, locked, write_aside, write_bytes, write_folder_aside, write_text
+from charnerf.files import (
+    cache_folder,
+    disk_words,
+    locked,
+    write_aside,
+    write_bytes,
+    write_folder_aside,
+    write_text,
+)
 
 
 def test_the_old_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
@@ -98,3 +106,27 @@ def test_a_cache_lies_where_it_is_given_else_in_the_users(monkeypatch: pytest.Mo
     assert cache_folder() == Path("/home/me/.cache/charnerf")
     monkeypatch.setenv("XDG_CACHE_HOME", "/fast")
     assert cache_folder(None) == Path("/fast/charnerf")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
+@pytest.mark.parametrize("folder", ["", "out"])
+def test_a_full_disk_is_named_by_what_is_written(tmp_path: Path, folder: str) -> None:
+    """Libraries name no file then; what is beside its place is named by its place."""
+    writing = write_folder_aside(tmp_path / folder) if folder else write_aside(tmp_path / "a.bin")
+    with pytest.raises(OSError, match="No space") as caught, writing as aside:
+        piece = aside / "a.bin" if folder else aside
+        piece.symlink_to("/dev/full")
+        piece.write_bytes(bytes(10))
+    place = tmp_path / folder if folder else tmp_path / "a.bin"
+    words = disk_words(caught.value)
+    assert words.startswith(f"{place}: can not be written to (No space left on device), expected room;")
+    assert "the same command again" in words and not list(tmp_path.iterdir())
+
+
+def test_errors_of_the_system_are_sentences(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="Permission") as caught, write_folder_aside(tmp_path / "out") as aside:
+        raise PermissionError(13, "Permission denied", str(aside / "a/b"))
+    assert disk_words(caught.value).startswith(f"{tmp_path}/out/a/b: can not be opened (Permission denied), ")
+    with pytest.raises(FileNotFoundError) as missing, write_aside(tmp_path / "a"):
+        (tmp_path / "b").read_bytes()
+    assert disk_words(missing.value) == str(missing.value) and str(tmp_path / "b") in str(missing.value)

@@ -14,6 +14,12 @@ from charnerf.errors import DataError
 from charnerf.interruption import held
 
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # the opening of a pipe waits for nobody
+_NO_ROOM = (
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EFBIG,
+)  # of a disk, of a user's share, of what a process may write
+_NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 MOST_TEXT = 64 * 2**20  # bytes of a file that is read whole, such as JSON
 
 
@@ -117,8 +123,9 @@ def write_aside(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        yield aside
-        os.replace(aside, path)
+        with named_in_errors(path, aside):
+            yield aside
+            os.replace(aside, path)
     finally:
         aside.unlink(missing_ok=True)
 
@@ -146,6 +153,32 @@ def sync_folder(path: Path) -> None:
 
 
 @contextmanager
+def named_in_errors(path: Path, aside: Path) -> Iterator[None]:
+    """Let errors of the system name what is written, not the place aside; those of a full disk name nothing at all."""
+    try:
+        yield
+    except OSError as error:
+        if str(error.filename).startswith(str(aside)):
+            error.filename = f"{path}{str(error.filename).removeprefix(str(aside))}"
+        elif error.filename is None and error.errno in _NO_ROOM:
+            error.filename = str(path)
+        raise
+
+
+def disk_words(error: OSError) -> str:
+    """An error of the system as a message: the file, what was found, what was expected, what to do."""
+    where, found = error.filename or "the disk", error.strerror
+    if error.errno in _NO_ROOM:
+        return (
+            f"{where}: can not be written to ({found}), expected room; what was written before is whole. Make room, and give the"
+            " same command again."
+        )
+    if error.errno in _NOT_ALLOWED:
+        return f"{where}: can not be opened ({found}), expected to be allowed to. Change its permissions, or name another place."
+    return str(error)
+
+
+@contextmanager
 def named_full_disk(folder: Path) -> Iterator[None]:
     """Name the folder that is written to where the disk is full; libraries say no more than that.
 
@@ -155,7 +188,7 @@ def named_full_disk(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        if error.errno not in _NO_ROOM:
             raise
         raise DataError(
             f"{folder}: can not be written to ({error.strerror}), expected room; what was written before stays. Make room, and"
@@ -243,16 +276,22 @@ def write_folder_aside(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
     try:
-        yield aside
-        with held():
-            if path.exists():
-                for piece in sorted(aside.iterdir()):
-                    _replace(piece, path / piece.name)
-            else:
-                aside.chmod(0o755)
-                aside.rename(path)
+        with named_in_errors(path, aside):
+            yield aside
+            with held():
+                _put(aside, path)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
+
+
+def _put(aside: Path, path: Path) -> None:
+    """Let a folder take its place, or its pieces theirs where there is one."""
+    if not path.exists():
+        aside.chmod(0o755)
+        aside.rename(path)
+        return
+    for piece in sorted(aside.iterdir()):
+        _replace(piece, path / piece.name)
 
 
 def _replace(piece: Path, target: Path) -> None:

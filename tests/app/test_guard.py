@@ -31,6 +31,8 @@ def test_a_foreign_name_that_points_here_is_refused(host):
         "http://localhost",
         "http://localhost:9",
         "http://localhost:8765.evil",
+        "http://[",
+        "http://\u2100.com",
     ],
 )
 def test_another_page_changes_nothing(origin):

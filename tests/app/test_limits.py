@@ -73,6 +73,50 @@ def test_what_can_not_be_used_is_a_sentence_and_leaves_nothing(work, tmp_path):
     asyncio.run(story())
 
 
+def test_what_is_broken_is_a_sentence_and_no_fault_of_the_server(work, caplog):
+    """Bodies that stop, that are no text, that say other settings; requests that are none of HTTP; a full disk."""
+
+    async def story():
+        async with app_server(work, limits=Limits(silence_s=0.3)) as (studio, open_page):
+            page = await open_page()
+            session, port = studio.sessions[page.session], page.client._base_url.port
+
+            async def raw(line, *headers):
+                reader, writer = await asyncio.open_connection("127.0.0.1", port)
+                writer.write("\r\n".join([f"{line} HTTP/1.1", *headers, "", "{}"]).encode())
+                answer = await asyncio.wait_for(reader.read(2000), 5)
+                writer.close()
+                return answer.decode()
+
+            own = f"Host: localhost:{port}", f"Origin: http://localhost:{port}"
+            for path in ("pictures?name=half.png", "build"):
+                post = f"POST /sessions/{page.session}/{path}"
+                assert "nothing more for 0.3 seconds" in await raw(post, *own, "Content-Length: 100")
+                zipped = await raw(post, *own, "Content-Length: 2", "Content-Encoding: gzip")
+                assert zipped.startswith("HTTP/1.1 400") and "found a body that can not be read" in zipped
+            for kind in ("utf-99", "rot13"):
+                text = f"Content-Type: application/json; charset={kind}"
+                assert (await raw(post, *own, "Content-Length: 2", text)).startswith("HTTP/1.1 400")
+            assert (await raw("GET /")).startswith("HTTP/1.0 400")
+            assert (await raw("GET http://[/", *own)).startswith("HTTP/1.0 400")
+            for reading in ([1], 1, "x"):
+                status, answer = await page.ask("POST", "figures", json={"reading": reading})
+                assert status == 400 and answer["error"].startswith("settings: found")
+
+            def on_a_full_disk(*_):
+                (session.folder / "9").mkdir()
+                (session.folder / "9/a.png").symlink_to("/dev/full")
+                return session.folder / "9/a.png"
+
+            studio.reader.new_picture = on_a_full_disk
+            status, answer = await page.ask("POST", "pictures", data=bytes(10**5))
+            assert status == 507 and answer["error"].startswith("This machine can not keep it (No space left")
+            assert session.pictures == [] and not list(session.folder.rglob("*"))
+
+    asyncio.run(story())
+    assert not caplog.records
+
+
 def test_nobody_reaches_what_he_was_not_told_of(work, tmp_path):
     (tmp_path / "secret").write_text("secret")
 

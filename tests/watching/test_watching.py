@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import socket
 import subprocess
 import sys
 import threading
@@ -222,11 +223,28 @@ def test_pages_blocks_and_reports_are_served(server):
         "/%2e%2e/secret.html",
         "/b/../../secret.html",
         "/b/config.yaml",
+        "/b%00/report.html",
+        "/%ff",
     ],
 )
 def test_nothing_else_is_served(server, path):
     status, text, _ = ask(server, path)
     assert status == 404 and "secret" not in text
+
+
+def test_an_address_that_is_none_is_answered(server):
+    with socket.create_connection(server.server_address) as connection:
+        connection.sendall(b"GET http://[/ HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert connection.makefile("rb").readline().endswith(b"404 Not Found\r\n")
+
+
+def test_half_a_question_is_not_waited_for(server, monkeypatch):
+    monkeypatch.setattr(server.RequestHandlerClass, "timeout", 0.1)
+    with socket.create_connection(server.server_address) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\nHost: localh")
+        connection.settimeout(5)
+        assert connection.recv(1) == b""
+    assert ask(server, "/")[0] == 200
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "", "[::1]x"])

@@ -5,7 +5,6 @@ itself (Origin); and a session is known by an id that can not be guessed.
 """
 
 from collections.abc import Collection, Mapping
-from urllib.parse import urlsplit
 
 from charnerf.hosts import host_name, is_known
 
@@ -46,7 +45,7 @@ def refusal(method: str, headers: Mapping[str, str], names: Collection[str]) -> 
             f" --name {name[:60] or 'NAME'}."
         )
     origin = headers.get("Origin")
-    if method not in SAFE and (origin is None or urlsplit(origin).netloc.lower() != host.lower()):
+    if method not in SAFE and (origin is None or origin.partition("://")[2].lower() != host.lower()):
         return "Origin: found another page's, expected this page's own. Open the page itself."
     if headers.get("Sec-Fetch-Site", "none") == "cross-site" and headers.get("Sec-Fetch-Mode") != "navigate":
         return "Sec-Fetch-Site: found another page's request, expected this page's own. Open the page itself."

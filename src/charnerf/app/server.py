@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection
 from contextlib import asynccontextmanager
 from importlib.resources import files
@@ -9,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
 
 from charnerf.app.examples import EXAMPLES, example_files
 from charnerf.app.guard import HEADERS, REPORT_HEADERS, refusal
+from charnerf.app.received import MOST_TEXT, keep, said, title_of
 from charnerf.app.session import Session, thumbnail_of
 from charnerf.app.settings import Reading, form, read_plan
 from charnerf.app.studio import Studio
@@ -26,8 +29,6 @@ PAGE = {
     "/app.css": ("charnerf.app", "page/app.css", "text/css"),
     "/page.css": ("charnerf.reporting", "page.css", "text/css"),
 }
-MOST_TEXT = 64 * 1024  # bytes of what the page says
-MOST_NAME = 120  # signs of a file's name
 HEARTBEAT = 15.0  # seconds
 LOOKS = range(32, 513)  # pixels a side
 STUDIO: web.AppKey[Studio] = web.AppKey("studio", Studio)
@@ -84,7 +85,11 @@ async def serving(
         OSError: If it can not be served there.
     """
     runner = web.AppRunner(
-        make_app(studio, names), handler_cancellation=True, access_log=None, shutdown_timeout=1.0
+        make_app(studio, names),
+        handler_cancellation=True,
+        access_log=None,
+        logger=_log_of_faults(),
+        shutdown_timeout=1.0,
     )
     await runner.setup()
     try:
@@ -93,6 +98,18 @@ async def serving(
         yield str(address[0]), int(address[1])
     finally:
         await runner.cleanup()
+
+
+def _log_of_faults() -> logging.Logger:
+    """Tells faults of the server, not requests that are none of HTTP, nor pages that are closed."""
+
+    def is_fault(record: logging.LogRecord) -> bool:
+        error = record.exc_info[1] if record.exc_info else None
+        return not isinstance(error, HttpProcessingError | web.RequestPayloadError | ConnectionError)
+
+    log = logging.getLogger("charnerf.app")
+    log.filters = [is_fault]
+    return log
 
 
 def _guarded(names: Collection[str]) -> Callable[..., Any]:
@@ -105,14 +122,32 @@ def _guarded(names: Collection[str]) -> Callable[..., Any]:
             return _problem(403, why)
         try:
             return await handler(request)
-        except (CharNeRFError, Refused) as error:
-            return _problem(400, str(error))
-        except web.HTTPRequestEntityTooLarge:
-            return _problem(413, f"found more than {MOST_TEXT} bytes, expected fewer. Load the page again.")
-        except web.HTTPException as error:
-            return _problem(error.status, error.text or error.reason)
+        except ConnectionError:
+            raise  # the page is closed
+        except (CharNeRFError, Refused, OSError, web.HTTPException, web.RequestPayloadError) as error:
+            return _problem(*_answer_to(error))
 
     return guard
+
+
+def _answer_to(error: Exception) -> tuple[int, str]:
+    """Status and sentence of an error."""
+    match error:
+        case web.HTTPRequestEntityTooLarge():
+            return 413, f"found more than {MOST_TEXT} bytes, expected fewer. Load the page again."
+        case web.HTTPException():
+            return error.status, error.text or error.reason
+        case web.RequestPayloadError():
+            return (
+                400,
+                "found a body that can not be read, expected a whole and plain one. Load the page again.",
+            )
+        case OSError():
+            return (
+                507,
+                f"This machine can not keep it ({error.strerror}). Make room on its disk, and try again.",
+            )
+    return 400, str(error)
 
 
 def _problem(status: int, sentence: str) -> web.Response:
@@ -194,36 +229,10 @@ async def _is_set(event: asyncio.Event, seconds: float) -> bool:
 async def _add(request: web.Request) -> web.Response:
     """A picture, as the request's whole body."""
     studio, session = request.app[STUDIO], _session(request)
-    title = _title(request.query.get("name", ""))
-    too_large = DataError(
-        f"{title}: found more than {studio.limits.upload // 2**20} MiB, expected fewer. Save it smaller, as PNG or JPEG."
-    )
-    if (request.content_length or 0) > studio.limits.upload:
-        raise too_large
-    file = studio.reader.new_picture(session, title)
-    try:
-        size = 0
-        with file.open("wb") as stream:
-            async for piece in request.content.iter_chunked(2**16):
-                size += len(piece)
-                if size > studio.limits.upload:
-                    raise too_large
-                stream.write(piece)
-    except BaseException:
-        file.unlink(missing_ok=True)
-        file.parent.rmdir()
-        raise
+    file = studio.reader.new_picture(session, title_of(request.query.get("name", "")))
+    await keep(request, file, most=studio.limits.upload, silence_s=studio.limits.silence_s)
     await studio.reader.add_picture(session, file, more="more" in request.query)
     return _done()
-
-
-def _title(name: str) -> str:
-    """A file's name that is one, and nothing else: no path, no hidden file, nothing that can not be printed."""
-    name = "".join(sign for sign in name.replace("\\", "/").rpartition("/")[2] if sign.isprintable())
-    name = name.lstrip(". ")
-    while len(name.encode("utf-8", "ignore")) > MOST_NAME:
-        name = name[:-1]
-    return name.encode("utf-8", "ignore").decode() or "drawing"
 
 
 async def _add_example(request: web.Request) -> web.Response:
@@ -247,8 +256,8 @@ async def _remove(request: web.Request) -> web.Response:
 
 async def _edit(request: web.Request) -> web.Response:
     """Names, left-out and mirrored figures; how drawings are read."""
-    session, said = _session(request), await _said(request)
-    changes, reading = said.get("figures", {}), said.get("reading")
+    session, words = _session(request), await said(request, request.app[STUDIO].limits.silence_s)
+    changes, reading = words.get("figures", {}), words.get("reading")
     if not isinstance(changes, dict) or not all(
         isinstance(one, dict) and isinstance(one.get("view"), str) and isinstance(one.get("mirrored"), bool)
         for one in changes.values()
@@ -266,7 +275,9 @@ async def _edit(request: web.Request) -> web.Response:
 
 
 async def _build(request: web.Request) -> web.Response:
-    request.app[STUDIO].queue.build(_session(request), read_plan(await _said(request)))
+    request.app[STUDIO].queue.build(
+        _session(request), read_plan(await said(request, request.app[STUDIO].limits.silence_s))
+    )
     return _done()
 
 
@@ -350,14 +361,3 @@ def _number(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 10):
         raise web.HTTPNotFound(text="There is no such picture.")
     return int(text)
-
-
-async def _said(request: web.Request) -> dict[str, Any]:
-    """What the page says, an object of JSON."""
-    try:
-        said = await request.json()
-    except (ValueError, RecursionError) as error:
-        raise DataError("found no JSON, expected an object. Load the page again.") from error
-    if not isinstance(said, dict):
-        raise DataError("found no object of JSON, expected one. Load the page again.")
-    return said

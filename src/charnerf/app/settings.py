@@ -113,12 +113,14 @@ def form() -> list[dict[str, Any]]:
     return [asdict(field) for field in FIELDS]
 
 
-def read_plan(values: Mapping[str, Any]) -> Plan:
+def read_plan(values: Any) -> Plan:
     """The plan of a filled form; what is not in it stays at its default.
 
     Raises:
         ConfigError: If a value is out of range or of another kind; the message names its field as the page does.
     """
+    if not isinstance(values, Mapping):
+        raise ConfigError("settings: found something else, expected values by name. Load the page again.")
     unknown = values.keys() - {field.name for field in FIELDS}
     if unknown:
         raise ConfigError(f"{sorted(unknown)[0][:40]!r}: no such setting. Load the page again.")

@@ -16,6 +16,7 @@ _SAID = (  # what a command line says, and what the page does
     (r"; --as-drawn takes the others alone", "; “As drawn” takes the others alone"),
     (r"say --view (\d+)=FILE in its place, or of a sheet --figure \d+=N: a side", r"call it \1 degrees: a side"),
     (r" \(--keep-ink leaves them\)", " (“Keep ink” leaves them)"),
+    (r"give the same command again\.", "try again."),
     (r" \(docs/\w+\.md\)", ""),
     (r": crop it to the views of one character, or give them one by one with --view\.", ": crop it to the views of one character."),
     (r"Install it by `pip install 'charnerf\[usd\]'`, or choose \.glb\.",
@@ -30,7 +31,7 @@ def page_words(text: str, folder: Path) -> str:
         text: The sentence.
         folder: The session's; each picture lies in a folder of its own in there.
     """
-    text = re.sub(rf"{re.escape(str(folder))}/\d+/", "", text)
+    text = re.sub(rf"{re.escape(str(folder))}/(\d+/)?", "", text)
     for said, shown in _SAID:
         text = re.sub(said, shown, text, flags=re.DOTALL)
     return text

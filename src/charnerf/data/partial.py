@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from charnerf.files import named_in_errors
+
 _PREFIX = ".partial-"
 
 
@@ -20,9 +22,10 @@ def character_aside(root: Path, name: str) -> Iterator[Path]:
     aside = root / f"{_PREFIX}{os.getpid()}-{name}"
     shutil.rmtree(aside, ignore_errors=True)
     try:
-        aside.mkdir(parents=True)  # in here: a signal that comes meanwhile is answered right behind it
-        yield aside
-        aside.rename(root / name)
+        with named_in_errors(root / name, aside):
+            aside.mkdir(parents=True)  # in here: a signal that comes meanwhile is answered right behind it
+            yield aside
+            aside.rename(root / name)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 

@@ -5,7 +5,7 @@ import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, final
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 from charnerf.errors import CharNeRFError
 from charnerf.hosts import host_name, is_known
@@ -74,20 +74,21 @@ class _Handler(BaseHTTPRequestHandler):
     """Answers GET: a page, its blocks, or a report that lies there."""
 
     server: WatchServer  # type: ignore[assignment]
+    timeout = 10.0  # seconds for what is asked
 
     def do_GET(self) -> None:
         """Answer."""
         if not is_known(host_name(self.headers.get("Host", "")), NAMES):
             self._answer(HTTPStatus.FORBIDDEN, b"This page is for the machine that it runs on.", "text/plain")
             return
-        address = urlsplit(self.path)
-        path = unquote(address.path, errors="surrogateescape")
+        path, _, query = self.path.partition("?")
+        path = unquote(path, errors="surrogateescape")
         try:
             name, _, last = path.removeprefix("/").rpartition("/")
             if last == REPORT:
                 self._report(name)
             else:
-                self._page(path.removeprefix("/") or None, whole=address.query != "blocks")
+                self._page(path.removeprefix("/") or None, whole=query != "blocks")
         except (CharNeRFError, OSError) as error:
             self._answer(
                 HTTPStatus.INTERNAL_SERVER_ERROR,
