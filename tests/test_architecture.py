@@ -28,7 +28,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
         "progress",
         "wording",
     ),
-    ("pictures", "viewer"),
+    ("parallel", "pictures", "viewer"),
     ("process",),
     ("geometry",),
     ("scene",),

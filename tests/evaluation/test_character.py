@@ -57,6 +57,6 @@ def test_baselines_are_left_out_or_say_why_they_are_missing(doll):
 
 def test_every_execution_of_a_stage_is_timed_and_every_picture_is_announced(found, announced):
     counts = {stage: len(seconds) for stage, seconds in found.seconds.items()}
-    assert counts == {"encode": 1, "render": 2, "hull_encode": 1, "hull_render": 2}
+    assert counts == {"encode": 1, "render": 2, "hull_encode": 1, "hull_render": 2, "metrics": 1}
     assert len(announced) == len(FRAMES)
     assert set(found.peaks_mib) == set(counts)

@@ -25,6 +25,18 @@ def make_mesh(scene, views):
     return SimpleNamespace(mesh=scene.hull.mesh, left_out=LeftOut(grid_cells=5, grid_cells_of=8))
 
 
+class Broken:
+    """Draws NaN."""
+
+    def prepared(self, scene):
+        return scene
+
+    def render_camera(self, scene, camera):
+        shape = (camera.height, camera.width)
+        output = RenderOutput(torch.full((*shape, 3), math.nan), torch.zeros(shape), torch.zeros(shape))
+        return SimpleNamespace(finest=output, left_out=LeftOut())
+
+
 @pytest.fixture(scope="module")
 def outcome(figure_dataset, tmp_path_factory):
     output = tmp_path_factory.mktemp("run")
@@ -56,6 +68,37 @@ def test_every_key_of_the_format_is_there_and_every_null_has_its_reason(outcome)
     assert found["peak_memory_mib"] > 50.0
     assert len(found["by_azimuth"]) == 12
     assert sum(row["num_views"] for row in found["by_elevation"]) == 8
+
+
+@pytest.mark.slow
+def test_two_processes_measure_what_one_does(outcome, figure_dataset, tmp_path):
+    """Numbers, files and the order of characters; the record says how many there were."""
+    found, output = outcome
+    again = evaluate(
+        HullModel(),
+        HullRenderer(),
+        figure_dataset,
+        "test",
+        views=4,
+        output=tmp_path,
+        mesh=make_mesh,
+        train_seconds=12.5,
+        processes=3,
+    )
+    assert again["environment"]["processes"] == 2 and again["environment"]["threads"] == 1
+    untimed = [{**one, "seconds": 0, "environment": 0, "peak_memory_mib": 0} for one in (found, again)]
+    for one in untimed:
+        one["baselines"] = {name: {**scores, "seconds": 0} for name, scores in one["baselines"].items()}
+        del one["peak_memory_by_stage_mib"]
+    assert untimed[0] == untimed[1]
+    for file in ("views.csv", "images/doll/sheet.png"):
+        assert (tmp_path / file).read_bytes() == (output / file).read_bytes()
+
+
+@pytest.mark.slow
+def test_an_error_of_a_process_is_the_errors_own(figure_dataset):
+    with pytest.raises(NumericalError, match=r"(ball|doll), view \d: rgb"):
+        evaluate(BlindModel(), Broken(), figure_dataset, "test", views=1, processes=2)
 
 
 def test_a_model_that_answers_the_hull_scores_as_the_hull(outcome):
@@ -127,15 +170,6 @@ def test_a_mesh_that_fails_is_a_reason_and_no_end(figure_dataset):
 
 
 def test_a_prediction_of_nan_names_its_picture(figure_dataset):
-    class Broken:
-        def prepared(self, scene):
-            return scene
-
-        def render_camera(self, scene, camera):
-            shape = (camera.height, camera.width)
-            output = RenderOutput(torch.full((*shape, 3), math.nan), torch.zeros(shape), torch.zeros(shape))
-            return SimpleNamespace(finest=output, left_out=LeftOut())
-
     with pytest.raises(NumericalError, match=r"ball, view \d: rgb"):
         evaluate(BlindModel(), Broken(), figure_dataset, "test", views=1)
 

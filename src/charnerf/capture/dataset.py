@@ -16,7 +16,6 @@ from charnerf.capture import unfinished
 from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.dressing import dress
 from charnerf.capture.meshes import check_axes
-from charnerf.capture.parallel import in_processes
 from charnerf.capture.part_swaps import swap_parts
 from charnerf.capture.renderers.base import AbstractRenderer
 from charnerf.capture.variants import SEPARATOR, variant
@@ -24,6 +23,7 @@ from charnerf.data.characters import CharacterPictures, write_character
 from charnerf.data.layout import add_to_split, check_name
 from charnerf.errors import CharNeRFError, DataError
 from charnerf.files import check_folder
+from charnerf.parallel import in_processes
 from charnerf.progress import Progress
 from charnerf.surfaces.mesh_files import write_surface_mesh
 from charnerf.surfaces.surface_mesh import SurfaceMesh

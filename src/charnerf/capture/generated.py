@@ -11,11 +11,11 @@ import trimesh
 
 from charnerf.capture.character import CaptureOptions
 from charnerf.capture.dataset import capture_scene_to, made_by
-from charnerf.capture.parallel import in_processes
 from charnerf.capture.unfinished import listed_as_made
 from charnerf.data.layout import DatasetInfo, add_to_split, open_or_new, read_dataset, write_dataset
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import locked
+from charnerf.parallel import in_processes
 from charnerf.procedural import GENERATOR_VERSION, make_character
 from charnerf.progress import Progress
 from charnerf.surfaces.surface_mesh import SurfaceMesh

@@ -22,6 +22,8 @@ from charnerf.meshing.options import MeshOptions
 from charnerf.wording import counted
 
 if TYPE_CHECKING:
+    import torch
+
     from charnerf.data.characters import Character
 
 EXAMPLES = (
@@ -60,6 +62,13 @@ Resolution = Annotated[
     int | None,
     typer.Option(
         max=1024, help="Grid points along a mesh's longest side; as many as in the run if left out."
+    ),
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Characters at once, of one thread each; on a CPU as many as torch has threads, where each gets two.",
     ),
 ]
 Baselines = Annotated[
@@ -110,13 +119,11 @@ def command(
     drawn: Drawn = None,
     sources: SourcesOption = None,
     reading: ReadingOptions,
+    jobs: Jobs = None,
     device: Device = "auto",
     trust: Trusted = None,
 ) -> None:
-    """Measure a model on a split: PSNR, SSIM, LPIPS, FLIP, IoU, Chamfer, F-score, by angle, with seconds.
-
-    Prints metrics.json.
-    """
+    """Measure a model on a split: PSNR, SSIM, LPIPS, FLIP, IoU, Chamfer, F-score, by angle, with seconds. Prints metrics.json."""
     began, num_views = time.perf_counter(), _number_of_views(views)
     from charnerf.evaluation.evaluate import evaluate
     from charnerf.evaluation.nearest import TrainingCharacters
@@ -128,11 +135,11 @@ def command(
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
     run_views, run_resolution = _measured_by(run)
-    options = MeshOptions(resolution=resolution or run_resolution, height=None)
+    options, root = MeshOptions(resolution=resolution or run_resolution, height=None), data.opened()
     metrics = evaluate(
         model.network,
         model.renderer,
-        data.opened(),
+        root,
         split,
         views=num_views or run_views,
         output=output,
@@ -141,9 +148,21 @@ def command(
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=noted_seconds(run),
         redrawn=source_drawer(model.image_size),
+        processes=jobs or _processes(model.network.device, root, split),
     )
     _write(metrics, output, json_file, began)
     typer.echo(json.dumps(metrics, indent=2))
+
+
+def _processes(device: "torch.device", root: Path, split: str) -> int:
+    """How many characters are measured at once: a process takes seconds to start."""
+    import torch
+
+    from charnerf.data.layout import names_of, read_dataset
+
+    if device.type != "cpu":
+        return 1
+    return max(1, min(torch.get_num_threads(), len(names_of(read_dataset(root), split)) // 2))
 
 
 def _check(output: Path | None, json_file: Path | None, resolution: int | None) -> None:

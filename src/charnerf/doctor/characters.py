@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from charnerf.capture.parallel import in_processes
 from charnerf.data.layout import DATASET_FILE, MESH_FILE, TRANSFORMS_FILE, read_dataset
 from charnerf.doctor.camera_file import read_camera_file
 from charnerf.doctor.depth import depth_findings
@@ -25,6 +24,7 @@ from charnerf.foreign.kept import is_ours, recognised
 from charnerf.foreign.shot import read_mask
 from charnerf.foreign.transforms_json import TransformsJson, camera_files
 from charnerf.geometry.carving import spread
+from charnerf.parallel import in_processes
 
 MOST_ALIKE = 3  # findings of one kind that are told of a character
 PICTURE_SIDE = 256  # pixels of evidence

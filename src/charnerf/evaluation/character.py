@@ -44,7 +44,7 @@ class CharacterResult:
         pictures: Predictions (n), fields (H, W) on the CPU, of every method that draws.
         left_out: Work that was not done for ours.
         nearest: The training character that the baseline `nearest` took; None where it took none.
-        seconds: Of every execution of a stage: encode, render, mesh; hull_encode, hull_render.
+        seconds: Of every execution of a stage: encode, render, mesh; hull_encode, hull_render; metrics, of all methods.
         peaks_mib: Most memory that was held while a stage ran.
     """
 
@@ -103,7 +103,8 @@ def measure_character(
             answers["visual_hull"] = _visual_hull(character, frames, watch)
         if nearest is not None:
             answers["nearest"] = _nearest(nearest, character, frames)
-    scores = _scores(answers, character, frames, lpips or Lpips())
+        with watch.stage("metrics"):
+            scores = _scores(answers, character, frames, lpips or Lpips())
     if baselines and nearest is None:
         scores["nearest"] = missing_scores(NO_TRAINING_SET if training is None else NO_MATCH)
     return CharacterResult(

@@ -1,6 +1,6 @@
 """A model on a split of a data set, beside what a user has without learning: every number of metrics.json."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
@@ -17,6 +17,7 @@ from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.metrics_file import VIEWS_FILE, split_metrics, write_views
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.evaluation.pictures import save_pictures
+from charnerf.evaluation.side_by_side import measured_side_by_side
 from charnerf.models.charnerf import CharNeRF
 from charnerf.progress import Progress
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -43,6 +44,7 @@ def evaluate(
     train_seconds: float | None = None,
     redrawn: Callable[[Character], Character] = as_captured,
     share: Share = ALONE,
+    processes: int = 1,
 ) -> dict[str, Any]:
     """Measure a model on a split; draws a bar with the time left, returns the content of metrics.json.
 
@@ -50,7 +52,7 @@ def evaluate(
         network: In eval mode.
         renderer: Draws its scenes.
         root: Folder of the data set.
-        split: Which of its splits.
+        split: Of the data set.
         views: Fixed views a character, evenly chosen, or "all".
         output: Folder for every view's metrics, `views.csv`, and in `images/NAME/` the predictions (RGBA, named like the data
             set's pictures) and a contact sheet, `sheet.png`; None keeps none.
@@ -60,42 +62,58 @@ def evaluate(
         train_seconds: Training time to report; None where it is unknown.
         redrawn: Gives a character other source views, such as `drawings.redrawn` does.
         share: Which of the processes that measure the split together this is; each returns the numbers of all.
+        processes: How many, of one thread each, to start for this share; all arguments are sent to them. 1 measures in this one.
 
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
         NumericalError: If a prediction is not finite; the message names the picture.
     """
-    lpips = Lpips()
-    measure = partial(
-        measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training, lpips=lpips
+    of_one = partial(
+        measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training, lpips=Lpips()
     )
     names = names_of(read_dataset(root), split)[share.process :: share.processes]
-    characters = (redrawn(load_character(root, name)) for name in names)
+    measure = partial(_measured, of_one, Path(root), redrawn, views, output)
     with Progress(f"evaluate {split}") as progress:
-        results = _of_all(_measured(measure, characters, len(names), views, output, progress), share)
+        results = _of_all(_every(measure, names, processes, progress), share)
     if output is not None and share.process == 0:
         write_views(output / VIEWS_FILE, results)
-    return split_metrics(results, root, split, device=network.device, train_seconds=train_seconds)
+    return split_metrics(
+        results, root, split, device=network.device, train_seconds=train_seconds, processes=processes
+    )
+
+
+def _every(
+    measure: Callable[..., CharacterResult], names: Sequence[str], processes: int, progress: Progress
+) -> list[CharacterResult]:
+    """Measure characters by name, here one by one or in several processes."""
+    if min(processes, len(names)) > 1:
+        return measured_side_by_side(measure, names, processes, progress.update)
+    counters = [partial(progress.counter, of=(place, len(names))) for place in range(len(names))]
+    return [measure(name, counter=counter) for name, counter in zip(names, counters, strict=True)]
+
+
+def _uncounted(total: int) -> Callable[[], None]:
+    """A counter of pictures that nobody looks at."""
+    return lambda: None
 
 
 def _measured(
     measure: Callable[..., CharacterResult],
-    characters: Iterable[Character],
-    number: int,
+    root: Path,
+    redrawn: Callable[[Character], Character],
     views: int | Literal["all"],
     output: Path | None,
-    progress: Progress,
-) -> list[CharacterResult]:
-    """Measure characters one by one, and keep their pictures in files alone: they take memory."""
-    results = []
-    for place, character in enumerate(characters):
-        frames = fixed_views(character, views)
-        on_picture = progress.counter(len(frames), of=(place, number))
-        result = measure(character, frames, on_picture=on_picture)
-        if output is not None:
-            save_pictures(output / "images" / character.name, character, frames, result.pictures)
-        results.append(replace(result, pictures={}))
-    return results
+    name: str,
+    *,
+    counter: Callable[[int], Callable[[], object]] = _uncounted,
+) -> CharacterResult:
+    """Measure a character, and keep its pictures in files alone: they take memory."""
+    character = redrawn(load_character(root, name))
+    frames = fixed_views(character, views)
+    result = measure(character, frames, on_picture=counter(len(frames)))
+    if output is not None:
+        save_pictures(output / "images" / character.name, character, frames, result.pictures)
+    return replace(result, pictures={})
 
 
 def _of_all(results: list[CharacterResult], share: Share) -> list[CharacterResult]:

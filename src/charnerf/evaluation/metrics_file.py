@@ -28,8 +28,10 @@ def split_metrics(
     *,
     device: torch.device,
     train_seconds: float | None,
+    processes: int = 1,
 ) -> dict[str, Any]:
-    """All numbers of a split in the form of metrics.json."""
+    """All numbers of a split in the form of metrics.json; measured in at most so many processes."""
+    count = min(processes, len(results))
     ours = [result.scores[OURS] for result in results]
     views = [scores.views for scores in ours]
     return {
@@ -48,7 +50,7 @@ def split_metrics(
         "seconds": _seconds(results, train_seconds),
         **_memory(results, device),
         "left_out": _left_out(sum((result.left_out for result in results), LeftOut())),
-        "environment": environment(device),
+        "environment": environment(device) | ({"threads": 1, "processes": count} if count > 1 else {}),
         "data_root": str(Path(root).resolve()),
     }
 
@@ -85,6 +87,7 @@ def _seconds(results: Sequence[CharacterResult], train_seconds: float | None) ->
     seconds["mesh"] = _median_seconds(results, "mesh")
     if seconds["mesh"] is None:
         seconds["mesh_reason"] = "no mesh was made"
+    seconds["metrics"] = _median_seconds(results, "metrics")
     return seconds
 
 
@@ -101,6 +104,8 @@ def _memory(results: Sequence[CharacterResult], device: torch.device) -> dict[st
         for stage, peak in result.peaks_mib.items():
             peaks[stage] = max(peaks.get(stage, 0.0), peak)
     whole = max(peaks.values(), default=0.0) if device.type == "cuda" else process_peak_mib()
+    if whole is not None:  # what was measured in other processes is not in this one's peak
+        whole = max(whole, *peaks.values(), 0.0)
     stages = {stage: peaks[stage] for stage in ("encode", "render", "mesh") if stage in peaks}
     memory: dict[str, Any] = {"peak_memory_mib": whole, "peak_memory_by_stage_mib": stages}
     if whole is None:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from charnerf.capture.parallel import in_processes
 from charnerf.data.characters import write_character
 from charnerf.data.layout import DATASET_FILE, DatasetInfo, given_twice, write_dataset
 from charnerf.data.partial import whole_characters
@@ -21,6 +20,7 @@ from charnerf.foreign.reading import Reading
 from charnerf.foreign.shot import Shot
 from charnerf.foreign.srn import Srn
 from charnerf.foreign.transforms_json import TransformsJson
+from charnerf.parallel import in_processes
 from charnerf.progress import Progress
 
 log = logging.getLogger(__name__)

@@ -158,6 +158,7 @@ def _spent(metrics: Mapping[str, Any]) -> list[Block]:
             ("encoding a character", "encode", "encode"),
             ("a frame", "render_per_frame", "render"),
             ("a mesh", "mesh", "mesh"),
+            ("all metrics of a character", "metrics", "metrics"),
         )
     ]
     shares = metrics.get("left_out", {})

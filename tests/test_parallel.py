@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from charnerf.capture.parallel import in_processes
 from charnerf.errors import DataError
 from charnerf.interruption import Stopped
+from charnerf.parallel import in_processes
 
 
 def begin(number: int, folder: Path) -> int:

@@ -27,7 +27,7 @@ def in_processes(
     A block that is left early, by an error or a signal too, begins nothing more and waits for what is at hand.
 
     Args:
-        work: Function, with its arguments, that can be sent to another process.
+        work: Function, or a partial of one, that can be sent to another process.
         items: What to work on; hashable is not needed.
         processes: How many at once; None for one a core; 1 works in this process.
 
@@ -38,7 +38,7 @@ def in_processes(
     if count <= 1:
         yield ((item, work(item)) for item in items)
         return
-    context = clean_processes("charnerf.capture.dataset")
+    context = clean_processes(getattr(work, "func", work).__module__)
     with ProcessPoolExecutor(count, mp_context=context, initializer=_begin) as pool:
         waiting = {pool.submit(_do, work, item): item for item in items}
         try:
