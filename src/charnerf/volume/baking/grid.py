@@ -106,13 +106,19 @@ def between(volumes: tuple[Tensor, ...], at: Tensor) -> list[Tensor]:
     _, size_y, size_z = volumes[0].shape
     low = torch.minimum(at.floor().clamp_min_(0.0), at.new_tensor(volumes[0].shape)[:, None] - 2.0)
     x, y, z = low.int()
-    corner, second = (x * size_y + y).mul_(size_z).add_(z), at - low
+    corner, beyond = (x * size_y + y).mul_(size_z).add_(z), at - low
     steps = [(a * size_y + b) * size_z + c for a in (0, 1) for b in (0, 1) for c in (0, 1)]
     around = (corner + corner.new_tensor(steps)[:, None]).view(-1)
-    near_x, near_y, near_z = torch.stack((1.0 - second, second), dim=1)
-    weights = (near_x[:, None, None] * (near_y[:, None] * near_z)).view(len(steps), -1)
-    read = (one.reshape(-1).index_select(0, around).view(weights.shape) for one in volumes)
-    return [(values * weights).sum(0) for values in read]
+    read = (one.reshape(-1).index_select(0, around).to(at.dtype) for one in volumes)
+    return [_linear(corners.view(len(steps), -1), beyond) for corners in read]
+
+
+def _linear(corners: Tensor, beyond: Tensor) -> Tensor:
+    """Values (P,) between those of eight corners (8, P), x slowest, by places beyond the first one in steps, (3, P)."""
+    for share in beyond:
+        first, second = corners.chunk(2)
+        corners = torch.lerp(first, second, share)
+    return corners[0]
 
 
 def interpolated(index: Tensor, rows: Tensor, at: Tensor) -> Tensor:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from charnerf.geometry.rays import box_interval
-from charnerf.types import MovableRecord, RayBundle, TensorRecord
+from charnerf.types import RayBundle, TensorRecord
 from charnerf.volume.baking.grid import BakedGrid
 
 AT_ONCE = 3  # samples of a ray between two looks at how much light is left: a group
@@ -48,42 +48,54 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class _UnderWay(MovableRecord):
-    """Rays under way: their numbers (r,); where they began and go (3, r), in cells of the lattice; where they are and end (r,), m.
+class _UnderWay:
+    """Rays under way: their numbers (r,), and where they are.
 
-    Coordinates lie one after the other, so that every step is few long passes over memory.
+    Values are 11 rows of r: where they began and go, in cells of the lattice, and how slow they are, in m a cell, along x, y and
+    z each; where they are and where they end, m. They lie one after the other, so that every step is few long passes over memory.
     """
 
     numbers: Tensor
-    origins: Tensor
-    directions: Tensor
-    slowness: Tensor  # m a cell along each axis, (3, r)
-    t_vals: Tensor
-    ends: Tensor
+    values: Tensor
 
     @classmethod
     def of(cls, grid: BakedGrid, rays: RayBundle, near: Tensor, far: Tensor) -> "_UnderWay":
         """Those of rays (R,) that are within a grid somewhere, from near to far (R,), m."""
         numbers = (far > near).nonzero()[:, 0]
         some = rays.rows(numbers)
-        directions = (some.directions / grid.pitch).t().contiguous()
-        return cls(
-            numbers,
-            ((some.origins - grid.origin) / grid.pitch).t().contiguous(),
-            directions,
-            directions.abs().clamp_min_(1e-6).reciprocal_(),
-            near[numbers],
-            far[numbers],
-        )
+        origins, directions = (some.origins - grid.origin).t() / grid.pitch, some.directions.t() / grid.pitch
+        slowness = directions.abs().clamp_min_(1e-6).reciprocal_()
+        interval = torch.stack((near, far)).index_select(1, numbers)
+        return cls(numbers, torch.cat((origins, directions, slowness, interval)))
 
     def some(self, index: Tensor) -> "_UnderWay":
         """Those of numbers (n,) among these."""
-        return self._map(lambda value: value.index_select(-1, index))
+        return _UnderWay(self.numbers.index_select(0, index), self.values.index_select(1, index))
+
+    @property
+    def directions(self) -> Tensor:
+        """Where they go, (3, r), in cells a m."""
+        return self.values[3:6]
+
+    @property
+    def slowness(self) -> Tensor:
+        """(3, r), m a cell."""
+        return self.values[6:9]
+
+    @property
+    def t_vals(self) -> Tensor:
+        """Where they are, (r,), m; moves."""
+        return self.values[9]
+
+    @property
+    def ends(self) -> Tensor:
+        """(r,), m."""
+        return self.values[10]
 
     def at(self, t_vals: Tensor) -> Tensor:
         """Places (3, ..., r) at distances (..., r), m, counted in cells."""
         shape = (3, *[1] * (t_vals.ndim - 1), -1)
-        return torch.addcmul(self.origins.view(shape), self.directions.view(shape), t_vals)
+        return torch.addcmul(self.values[:3].view(shape), self.directions.view(shape), t_vals)
 
 
 @dataclass(frozen=True)
@@ -117,7 +129,9 @@ class _Groups(TensorRecord):
         return replace(self.rows(chosen), weights=weights)
 
 
-def march(grid: BakedGrid, rays: RayBundle, *, unseen: float, same_color: float = 0.0) -> Seen:
+def march(
+    grid: BakedGrid, rays: RayBundle, *, unseen: float, same_color: float = 0.0, spacing: float = SPACING
+) -> Seen:
     """Follow rays (R,) through a grid.
 
     Args:
@@ -125,41 +139,45 @@ def march(grid: BakedGrid, rays: RayBundle, *, unseen: float, same_color: float 
         rays: Rays (R,).
         unseen: Light that is followed no further; groups that take less than a fifth of it do not count.
         same_color: Share of a ray's light that has one colour: that of the place that takes most of it.
+        spacing: Between samples, in steps of the fine grid.
     """
     near, far = box_interval(rays, grid.low, grid.high)
-    light, errors, spacing = torch.ones_like(near), torch.zeros_like(near), SPACING * grid.step
+    light, errors, spacing = torch.ones_like(near), torch.zeros_like(near), spacing * grid.step
     way = _UnderWay.of(grid, rays, near, far)
     offsets = (torch.arange(AT_ONCE, dtype=near.dtype, device=near.device)[:, None] + 0.5) * spacing
     groups, num_samples = [_Groups(way.numbers[:0], near[:0], near[:0], near[:0])], 0
     while len(way.numbers):
-        cells, free = _free_way(grid, way)
-        t_vals = way.t_vals + free
-        holding = (free == 0.0).nonzero()[:, 0]
+        cells, gap, free = _free_way(grid, way)
+        holding = (gap == 0).nonzero()[:, 0]
         if len(holding):
             here = way.some(holding)
             samples = here.t_vals + offsets
             lengths = (here.ends - samples).add_(0.5 * spacing).clamp_(0.0, spacing)
             at = here.at(samples).mul_(grid.factor).view(3, -1)
-            depths = grid.read_densities(at).view(samples.shape) * lengths
+            depths = grid.read_densities(at).view(samples.shape).mul_(lengths)
             before = light.index_select(0, here.numbers)
-            after = before * torch.exp(-depths.cumsum(0))
-            weights = torch.cat((before[None], after[:-1])) - after
+            after = torch.exp(depths.cumsum(0).neg_()).mul_(before)
+            weights = torch.cat((before[None], after[:-1])).sub_(after)
             light.index_copy_(0, here.numbers, after[-1])
             off = grid.errors.view(-1).index_select(0, cells.index_select(0, holding))
-            errors.index_add_(0, here.numbers, (after * lengths).square_().sum(0) * off.square())
+            errors.index_add_(0, here.numbers, (after.mul_(lengths)).square_().sum(0).mul_(off.square_()))
             groups.append(_Groups.of(here.numbers, samples, weights, before, FAINT_SHARE * unseen))
-            t_vals.index_copy_(0, holding, here.t_vals + AT_ONCE * spacing)
+            free.index_fill_(0, holding, AT_ONCE * spacing)
             num_samples += samples.numel()
-        on = ((t_vals < way.ends) & (light.index_select(0, way.numbers) > unseen)).nonzero()[:, 0]
-        way = replace(way, t_vals=t_vals).some(on)
+        way.t_vals.add_(free)
+        on = (way.t_vals < way.ends).logical_and_(light.index_select(0, way.numbers) > unseen)
+        way = way.some(on.nonzero()[:, 0])
     found = _Groups.joined(groups)
     moments = torch.zeros_like(light).index_add_(0, found.rays, found.weights * found.t_vals)
     places = found.by_light(len(light), same_color)
     return Seen(places.rays, places.t_vals, places.weights, moments, light, far, errors.sqrt(), num_samples)
 
 
-def _free_way(grid: BakedGrid, way: _UnderWay) -> tuple[Tensor, Tensor]:
-    """Numbers (r,) of the cells that rays are in, and how far they may go until the next that holds something, m; 0 in it."""
+def _free_way(grid: BakedGrid, way: _UnderWay) -> tuple[Tensor, Tensor, Tensor]:
+    """Numbers (r,) of the cells that rays are in, cells to the next one that holds something (r,), and how far they may go, m.
+
+    That is meaningless in a cell that holds something.
+    """
     size_x, size_y, size_z = grid.gaps.shape
     at = way.at(way.t_vals)
     x, y, z = at.int()
@@ -169,7 +187,6 @@ def _free_way(grid: BakedGrid, way: _UnderWay) -> tuple[Tensor, Tensor]:
         .add_(z.clamp_(0, size_z - 1))
     )
     gap = grid.gaps.view(-1).index_select(0, cells)
-    inside = at - at.floor()
+    inside = at.sub_(at.floor())
     left = torch.where(way.directions < 0.0, inside, 1.0 - inside)  # to the border of the own cell
-    free = (left + (gap - 1.0)).mul_(way.slowness).amin(0).add_(BORDER)
-    return cells, torch.where(gap > 0, free, 0.0)
+    return cells, gap, (left.add_(gap - 1.0)).mul_(way.slowness).amin(0).add_(BORDER)

@@ -4,6 +4,7 @@ Letters: R rays, P places on them that have colours of their own.
 """
 
 import logging
+import math
 from collections.abc import Callable
 from typing import final
 
@@ -14,7 +15,7 @@ from charnerf.scene import Scene
 from charnerf.types import ErrorEstimate, LeftOut, RayBundle, Rendering, RenderOutput
 from charnerf.volume.baking.bake import FACTOR, UNSEEN_SHARE, bake
 from charnerf.volume.baking.field import BakedField
-from charnerf.volume.baking.march import Seen, march
+from charnerf.volume.baking.march import SPACING, Seen, march
 from charnerf.volume.quadrature.base import AbstractQuadrature
 from charnerf.volume.renderers.base import WHITE, AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
@@ -23,6 +24,7 @@ log = logging.getLogger(__name__)
 
 EXACT_SHARE = 0.5  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
 SAME_COLOR_SHARE = 0.8  # of the tolerance: share of a ray's light that has one colour
+MOST_SPACING = 5.0 / 3.0  # times that at the usual tolerance
 TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
 TURNING_TOLERANCE = 0.15  # the same of pictures that are gone in a tenth of a second
 
@@ -95,6 +97,7 @@ class BakedRenderer(AbstractRenderer):
                 rays,
                 unseen=UNSEEN_SHARE * self.tolerance,
                 same_color=SAME_COLOR_SHARE * self.tolerance,
+                spacing=spacing_of(self.tolerance),
             )
         return self._colored(field, rays, seen)
 
@@ -138,6 +141,11 @@ class BakedRenderer(AbstractRenderer):
                 num_unresolved=int((estimated > self.tolerance).sum()),
             ),
         )
+
+
+def spacing_of(tolerance: float) -> float:
+    """Of samples along a ray, in steps of the fine grid: their error grows with its square, up to where they would miss things."""
+    return SPACING * min(max(math.sqrt(tolerance / TOLERANCE), 1.0), MOST_SPACING)
 
 
 def largest_beyond(rows: Tensor, errors: Tensor, num_rays: int, allowed: float) -> Tensor:
