@@ -1,6 +1,8 @@
 """Cells of a grid: finished ones are skipped, killed ones go on, failed ones are recorded."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -11,7 +13,7 @@ import pytest
 from omegaconf import DictConfig, OmegaConf
 
 from charnerf.config.grid import config_hash, grid_command
-from charnerf.errors import ConfigError, GridError
+from charnerf.errors import ConfigError, DataError, GridError
 from charnerf.reporting.runs import read_unfinished
 from charnerf.training.cells import cells_of, read_cell, run_cell
 from charnerf.training.grid import begin_grid, check_grid, report_grid
@@ -151,6 +153,25 @@ def test_a_broken_state_is_named(tmp_path):
     (folder / "cell.json").write_text(json.dumps({"state": "done"}))
     with pytest.raises(ValueError, match="expected a cell's state"):
         read_cell(folder)
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe"])
+def test_a_state_that_is_no_file_is_named(tmp_path, kind):
+    state = tmp_path / cell(tmp_path, Trainer()).name / "cell.json"
+    state.unlink()
+    state.mkdir() if kind == "folder" else os.mkfifo(state)
+    for look in (lambda: cell(tmp_path, Trainer()), lambda: cells_of(tmp_path)):
+        with pytest.raises(DataError, match=rf"cell.json: found a {kind}.*expected a file"):
+            look()
+
+
+def test_a_file_in_the_place_of_a_cells_folder_is_named(tmp_path):
+    trainer, folder = Trainer(), tmp_path / cell(tmp_path, Trainer()).name
+    shutil.rmtree(folder)
+    folder.write_text("a note")
+    with pytest.raises(DataError, match=r"found a file, expected a folder"):
+        cell(tmp_path, trainer)
+    assert trainer.asked == [] and folder.read_text() == "a note"
 
 
 def test_where_a_run_begins_is_not_what_it_is():

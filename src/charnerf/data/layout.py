@@ -26,7 +26,7 @@ TRANSFORMS_FILE = "transforms.json"
 MESH_FILE = "mesh/mesh.obj"
 
 _VIEW_NAME = re.compile(r"[^/\\\x00-\x1f\x7f\ud800-\udfff]{1,100}")
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]*")
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,199}")  # file systems take 255 bytes
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def check_name(kind: str, name: str) -> None:
     """
     if not _NAME.fullmatch(name):
         raise DataError(
-            f"{kind} {name[:100]!r}: expected letters, digits and _ - + . only, not beginning with a dot; "
+            f"{kind} {name[:100]!r}: expected at most 200 letters, digits and _ - + . only, not beginning with a dot; "
             f"rename it."
         )
 

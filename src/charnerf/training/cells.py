@@ -18,7 +18,7 @@ from omegaconf import DictConfig
 
 from charnerf.config.grid import config_hash
 from charnerf.errors import DataError
-from charnerf.files import is_locked, read_text, write_text
+from charnerf.files import check_folder, is_locked, read_text, write_text
 from charnerf.reporting.runs import CELL_FILE, LOCK_FILE
 from charnerf.training.checkpoint import has_checkpoint
 from charnerf.training.run import run_training
@@ -68,8 +68,12 @@ def run_cell(
 
     Returns:
         How far it came.
+
+    Raises:
+        DataError: If its folder is a file, can not be written to, or holds an unreadable state.
     """
     folder = cell_folder(grid, cfg, name)
+    check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / REQUEST_FILE).touch()
     with _alone(folder) as is_alone:
@@ -100,7 +104,7 @@ def read_cell(folder: Path) -> Cell | None:
         DataError: If its file is unreadable.
     """
     file = folder / CELL_FILE
-    if not file.is_file():
+    if not file.exists():
         return None
     try:
         return Cell(name=folder.name, **json.loads(read_text(file)))
@@ -143,7 +147,7 @@ def _train(cfg: DictConfig, folder: Path, train: Callable[[DictConfig, Path], No
             train(cfg, folder)
         cell = Cell(folder.name, DONE, None, started, time.time())
     except Exception as error:
-        (folder / ERROR_FILE).write_text(traceback.format_exc(), encoding="utf-8")
+        write_text(folder / ERROR_FILE, traceback.format_exc())
         message = f"{type(error).__name__}: {' '.join(str(error).split())}"
         log.error("Failed, recorded in %s: %s", folder / ERROR_FILE, message)
         cell = Cell(folder.name, FAILED, message[:1000], started, time.time())
