@@ -12,7 +12,7 @@ from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.scene import AbstractField, FunctionField, Scene
 from charnerf.types import FieldOutput, Hull, RayBundle
 from charnerf.volume.quadrature import PiecewiseConstant
-from charnerf.volume.renderers.adaptive import AdaptiveRenderer
+from charnerf.volume.renderers.adaptive import POINTS_A_STAGE, AdaptiveRenderer, _columns_of_stage
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.refinement import march, split_bins
 from support import helpers, tiny_models
@@ -196,3 +196,13 @@ def test_the_estimate_bounds_a_jump_of_density():
     off = march(densities + torch.tensor([[0.0, 0.15 * 2.0, 0.0]]), rgb, known, widths, begins, 1.0)
     assert (found.rgb - off.rgb).abs().max() <= found.errors.sum() < 1.0
     assert math.isclose(float(found.opacity[0]), 1.0 - math.exp(-0.6), rel_tol=1e-6)
+
+
+def test_few_bins_are_one_stage_and_of_many_those_that_are_there_count():
+    few, many = torch.ones(10, 40, dtype=torch.bool), torch.ones(200, 40, dtype=torch.bool)
+    assert _columns_of_stage(few) == 40
+    columns = _columns_of_stage(many)
+    assert columns < 40 and 200 * columns == pytest.approx(POINTS_A_STAGE, abs=200)
+    many[:, ::2] = False  # padding costs nothing
+    assert _columns_of_stage(many) == 40
+    assert _columns_of_stage(torch.ones(5000, 40, dtype=torch.bool)) == 4

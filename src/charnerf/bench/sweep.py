@@ -28,6 +28,7 @@ BASELINE_SAMPLES = ((16, 8), (32, 16), (64, 32), (128, 64))
 SLOW_SECONDS = 1.0  # of a method's turns in sum, after which it takes no further one
 TOLERANCES = (0.2, 0.1, 0.05, 0.02, 0.01)
 FACTORS = (1, 2, 3)  # steps of the baked grid in a pixel of the drawings
+BAKED_TOLERANCES = (0.15, 0.02)  # beside its own
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def sweep(
 
 
 def sample_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
-    """Samples a ray: the baseline, dense, culled; adaptive by tolerance; and baked by the grid's step, baking excluded."""
+    """Samples a ray: the baseline, dense, culled; adaptive by tolerance; baked by step and tolerance, without the baking."""
     like = bench.like
     methods: dict[tuple[str, str], Method] = {}
     for coarse, fine in BASELINE_SAMPLES:
@@ -105,6 +106,9 @@ def sample_methods(bench: Workbench) -> dict[tuple[str, str], Method]:
     for factor in FACTORS:
         baked = BakedRenderer(**like, tolerance=TOLERANCE, factor=factor)
         methods[BAKED, f"1/{factor} pixel"] = partial(rendered_by, baked)
+    for tolerance in BAKED_TOLERANCES:
+        baked = BakedRenderer(**like, tolerance=tolerance)
+        methods[BAKED, f"tolerance {tolerance:g}"] = partial(rendered_by, baked)
     return methods
 
 

@@ -42,7 +42,8 @@ UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque 
 COLORLESS_SHARE = 0.15  # of the tolerance: light whose colour need not be evaluated
 NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
 RAYS_AT_ONCE = 4096
-POINTS_A_STAGE = 4096  # front to back; fewer would save samples and cost calls
+POINTS_A_STAGE = 2048  # front to back; fewer would save samples and cost calls
+LAST_STAGE = 4096  # points that are no longer worth a further stage
 
 
 @final
@@ -129,7 +130,7 @@ class AdaptiveRenderer(AbstractRenderer):
             rows = (light > UNSEEN_SHARE * self.tolerance).nonzero()[:, 0]
             if len(rows) == 0:
                 break
-            columns = slice(start, start + max(4, -(-POINTS_A_STAGE // len(rows))))
+            columns = slice(start, start + _columns_of_stage(widths[rows, start:] > 0))
             some = widths[rows, columns]
             if not bool((some > 0).any()):
                 break
@@ -205,6 +206,14 @@ def _candidates(bounds: Bounds, rays: RayBundle) -> tuple[Tensor, Tensor, Tensor
     near, far = box_interval(rays, *bounds.tight_box)
     index = (far > near).nonzero()[:, 0]
     return index, near[index], far[index]
+
+
+def _columns_of_stage(there: Tensor) -> int:
+    """How many columns of bins that are there (r, K), bool, are evaluated next: all, or as many as have POINTS_A_STAGE."""
+    up_to = there.sum(0).cumsum(0)
+    if int(up_to[-1]) <= LAST_STAGE:
+        return len(up_to)
+    return max(4, int(torch.searchsorted(up_to, POINTS_A_STAGE)))
 
 
 def _middles(s_edges: Tensor) -> Tensor:
