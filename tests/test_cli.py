@@ -278,6 +278,12 @@ def test_train_refuses_a_wrong_call_before_any_work(
         (DataError("x.png: found nothing."), 1, "error: x.png: found nothing.\n"),
         (ConfigError("a: b"), 2, "error: a: b\n"),
         (ZeroDivisionError("zero"), 1, "error: ZeroDivisionError: zero (HYDRA_FULL_ERROR=1 shows where)\n"),
+        (
+            PermissionError(13, "Permission denied", "a\x1b[2J"),
+            1,
+            "error: a\\x1b[2J: can not be opened (Permission denied), expected to be allowed to. Change its permissions, or name"
+            " another place.\n",
+        ),
         (KeyboardInterrupt(), 1, "stopped.\n"),
     ],
     ids=lambda case: type(case[0]).__name__,
@@ -293,8 +299,9 @@ def test_train_tells_errors_in_one_message(
     def fail() -> None:
         raise error
 
-    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    monkeypatch.delenv("HYDRA_FULL_ERROR", raising=False)
     assert run_door(fail, arguments=["scale=smoke"], conf=conf) == status
+    assert "HYDRA_FULL_ERROR" not in os.environ  # or the next call would show tracebacks
     assert capsys.readouterr().err == message
     monkeypatch.setenv("HYDRA_FULL_ERROR", "1")
     assert run_door(fail, arguments=["scale=smoke"], conf=conf) == status

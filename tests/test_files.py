@@ -130,3 +130,17 @@ def test_errors_of_the_system_are_sentences(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError) as missing, write_aside(tmp_path / "a"):
         (tmp_path / "b").read_bytes()
     assert disk_words(missing.value) == str(missing.value) and str(tmp_path / "b") in str(missing.value)
+
+
+def test_a_place_that_can_not_be_written_to_is_named_and_not_the_one_aside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a read-only disk the removal of what is not there fails too."""
+
+    def refuse(path: object, *_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system", str(path))
+
+    monkeypatch.setattr(os, "unlink", refuse)
+    with pytest.raises(OSError, match="Read-only") as caught, write_aside(tmp_path / "a.txt") as aside:
+        refuse(aside)
+    assert caught.value.filename == str(tmp_path / "a.txt")

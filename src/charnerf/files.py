@@ -127,7 +127,8 @@ def write_aside(path: Path) -> Iterator[Path]:
             yield aside
             os.replace(aside, path)
     finally:
-        aside.unlink(missing_ok=True)
+        with suppress(OSError):  # it is not there, as on a disk that can not be written to
+            aside.unlink()
 
 
 def write_synced(path: Path, content: bytes) -> None:

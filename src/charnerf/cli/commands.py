@@ -36,6 +36,7 @@ from charnerf.errors import CharNeRFError, ConfigError
 from charnerf.files import disk_words
 from charnerf.interruption import Stopped, leave, listening
 from charnerf.process import limit_spinning
+from charnerf.wording import printable
 
 FAILED, WRONG_CALL = 1, 2
 DEBUG_NOTE = (
@@ -102,11 +103,6 @@ def main() -> None:
     leave(run(sys.argv[1:]))
 
 
-def _printable(text: str) -> str:
-    """A message as every terminal can show it: half characters and control signs, as names of files hold them, escaped."""
-    return "".join(one if one.isprintable() or one in "\n\t" else ascii(one)[1:-1] for one in text)
-
-
 def _taken(arguments: list[str], *flags: str) -> tuple[list[bool], list[str]]:
     """Which flags stand anywhere before a `--`, and the arguments without them; what comes after may be files of these names."""
     end = arguments.index("--") if "--" in arguments else len(arguments)
@@ -140,6 +136,6 @@ def run(arguments: list[str]) -> int:
         message = disk_words(error) if isinstance(error, OSError) else str(error)
         kind = "" if is_ours else f"{type(error).__name__}: "
         hint = "" if is_ours or debug else " (--debug shows where)"
-        typer.echo(f"error: {kind}{_printable(message)}{hint}", err=True)
+        typer.echo(f"error: {kind}{printable(message)}{hint}", err=True)
         return WRONG_CALL if isinstance(error, ConfigError) else FAILED
     return 0

@@ -34,9 +34,11 @@ def command(
 
     Runs that differ in their seed alone are one row. Interactive diagrams need plotly (the extra `report`).
     """
+    from charnerf.files import check_folder
     from charnerf.reporting.folder_report import report
 
     began = time.perf_counter()
     check_json(json_file)
+    check_folder(folder)
     file = report(folder, drawings=drawings, trusted=trust or ())
     close(Summary(made="a report", files=(file.with_suffix(".html"), file), began=began), json_file)

@@ -21,7 +21,8 @@ from charnerf.config.hydra_internals import looks_only, read_arguments
 from charnerf.config.overrides import config_files, jobs_of, trusted_by
 from charnerf.config.validation import check_files, validate, warn_of_idle_settings
 from charnerf.errors import CharNeRFError, ConfigError
-from charnerf.wording import counted
+from charnerf.files import disk_words
+from charnerf.wording import counted, printable
 
 FAILED, WRONG_CALL = 1, 2
 
@@ -69,7 +70,8 @@ def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: 
     Returns:
         Exit status: 0 done, 1 failed, 2 wrong call.
     """
-    debug = os.environ.get("HYDRA_FULL_ERROR") == "1"
+    before = os.environ.get("HYDRA_FULL_ERROR")
+    debug = before == "1"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra hands errors on instead of printing them
     try:
         check_command_line(arguments, conf=conf)
@@ -82,9 +84,15 @@ def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: 
             traceback.print_exc()
         is_ours = isinstance(error, CharNeRFError | HydraException | OmegaConfBaseException | OSError)
         kind = "" if is_ours else f"{type(error).__name__}: "
+        message = disk_words(error) if isinstance(error, OSError) else str(error)
         hint = "" if is_ours or debug else " (HYDRA_FULL_ERROR=1 shows where)"
-        sys.stderr.write(f"error: {kind}{error}{hint}\n")
+        sys.stderr.write(f"error: {kind}{printable(message)}{hint}\n")
         return (
             WRONG_CALL if isinstance(error, ConfigError | HydraException | OmegaConfBaseException) else FAILED
         )
+    finally:
+        if before is None:  # else the next call of the process would show tracebacks
+            os.environ.pop("HYDRA_FULL_ERROR", None)
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = before
     return 0
