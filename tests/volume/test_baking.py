@@ -7,7 +7,7 @@ import torch
 
 from charnerf.geometry.cameras import pixel_lattice, project_into_all
 from charnerf.volume.baking.bake import _expected_errors, _without_bias
-from charnerf.volume.baking.directions import polynomials, projection, sampled_directions
+from charnerf.volume.baking.directions import expected_error, polynomials, projection, sampled_directions
 from charnerf.volume.baking.grid import (
     EMPTY_U,
     between,
@@ -69,6 +69,21 @@ def test_what_is_quadratic_in_the_direction_is_kept():
     )
     found = combined(coefficients.expand(20, -1), polynomials(along))
     torch.testing.assert_close(found, values(along))
+
+
+def test_of_what_a_network_bends_no_more_is_missed_than_expected():
+    """Rectified linear functions of the direction: errors over the sphere against those at the directions that were fitted."""
+    generator = torch.Generator().manual_seed(0)
+    slopes = torch.randn(3, 500, generator=generator, dtype=torch.float64)
+    starts = 0.5 * torch.randn(500, generator=generator, dtype=torch.float64)
+    along = torch.randn(300, 3, generator=generator, dtype=torch.float64)
+    along = along / along.norm(dim=-1, keepdim=True)
+    sampled = sampled_directions()
+    coefficients = projection(slopes) @ (sampled @ slopes + starts).relu()
+    missed, left = ((of @ slopes + starts).relu() - polynomials(of) @ coefficients for of in (along, sampled))
+    of_square = missed.square().mean()
+    assert 1.0 < float(expected_error(left).square().mean() / of_square) < 2.0
+    assert float(left.square().mean() / of_square) < 0.5  # what least squares leave says too little
 
 
 def test_gaps_are_cells_to_the_next_that_holds_something():

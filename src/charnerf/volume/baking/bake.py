@@ -16,6 +16,7 @@ from torch.nn import functional as F
 from charnerf.scene import Scene
 from charnerf.volume.baking.directions import (
     NUM_POLYNOMIALS,
+    expected_error,
     polynomials,
     projection,
     sampled_directions,
@@ -346,7 +347,7 @@ def _colors(scene: Scene, coarse: _Coarse, on_points: Callable[[int], None]) -> 
         coefficients = torch.einsum("bk,pkc->pbc", into, parts)
         fitted = torch.einsum("kb,pbc->pkc", back, coefficients)
         exact, kept = (coloring.rgb_of(some, one.transpose(0, 2).contiguous()) for one in (parts, fitted))
-        off = (exact - kept).abs().amax(0).square().mean(0).sqrt()  # (P,)
+        off = expected_error((exact - kept).abs().amax(0))
         rows.append(torch.cat((coefficients.flatten(1), off[:, None]), dim=-1))
         on_points(COLOR_COST * len(some))
     filled = torch.cat((torch.zeros_like(rows[0][:1]), *rows))

@@ -44,3 +44,11 @@ def projection(like: Tensor) -> Tensor:
     """From values at `sampled_directions` (12) to coefficients of `polynomials`: (9, 12), of least squares."""
     directions = sampled_directions()
     return (polynomials(directions).T / len(directions)).to(like)
+
+
+def expected_error(left: Tensor) -> Tensor:
+    """Root mean square over the sphere (...) of what polynomials miss, by what they leave at `sampled_directions`, (12, ...).
+
+    Least squares leave about (12 - 9) / 12 of a square there: the coefficients take the rest along.
+    """
+    return (left.square().sum(0) / (len(left) - NUM_POLYNOMIALS)).sqrt()

@@ -22,7 +22,7 @@ from charnerf.volume.renderers.culled import CulledRenderer
 
 log = logging.getLogger(__name__)
 
-EXACT_SHARE = 0.5  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
+EXACT_SHARE = 0.7  # of the tolerance: error that the grid's colours may add to a ray; the field is asked for the largest beyond
 SAME_COLOR_SHARE = 0.8  # of the tolerance: share of a ray's light that has one colour
 MOST_SPACING = 5.0 / 3.0  # times that at the usual tolerance
 TOLERANCE = 0.05  # error of a colour that is aimed at where nobody says
