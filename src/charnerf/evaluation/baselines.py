@@ -21,6 +21,7 @@ from charnerf.types import Cameras, RenderOutput, SourceViews
 _COARSE_CELL = 0.06
 _FINE_CELL = 0.012
 _MAX_CELLS = 3_000_000
+_POINTS_AT_ONCE = 65_536  # 3 MiB a tensor; all at once would take 500 MiB
 
 
 def white_prediction(camera: Cameras) -> RenderOutput:
@@ -77,6 +78,11 @@ def hull_field(cameras: Cameras, edge_distances: Tensor, points: Tensor) -> Tens
     return field
 
 
+def _in_chunks(cameras: Cameras, edge_distances: Tensor, points: Tensor) -> Tensor:
+    """`hull_field` of so many points (P, 3) that all at once would fill the memory."""
+    return torch.cat([hull_field(cameras, edge_distances, part) for part in points.split(_POINTS_AT_ONCE)])
+
+
 def _grid_points(low: Tensor, cell: float, counts: tuple[int, int, int]) -> Tensor:
     """Points of a grid, (prod(counts), 3)."""
     axes = [low[axis] + cell * torch.arange(counts[axis]) for axis in range(3)]
@@ -88,7 +94,7 @@ def carve(cameras: Cameras, edge_distances: Tensor) -> trimesh.Trimesh | None:
     centre = torch.tensor(CENTRE)
     count = 1 + int(2 * BOX_HALF_EXTENT / _COARSE_CELL)
     coarse = _grid_points(centre - BOX_HALF_EXTENT, _COARSE_CELL, (count, count, count))
-    near = hull_field(cameras, edge_distances, coarse) > -_COARSE_CELL
+    near = _in_chunks(cameras, edge_distances, coarse) > -_COARSE_CELL
     if not bool(near.any()):
         return None
     low = coarse[near].amin(0) - _COARSE_CELL
@@ -96,7 +102,7 @@ def carve(cameras: Cameras, edge_distances: Tensor) -> trimesh.Trimesh | None:
     cell = max(_FINE_CELL, float(extent.prod() / _MAX_CELLS) ** (1 / 3))
     counts = tuple(int(side / cell) + 2 for side in extent.tolist())
     assert len(counts) == 3
-    field = hull_field(cameras, edge_distances, _grid_points(low, cell, counts)).reshape(counts)
+    field = _in_chunks(cameras, edge_distances, _grid_points(low, cell, counts)).reshape(counts)
     solid = np.pad(field.numpy(), 1, constant_values=-cell)
     if not (solid > 0.0).any():
         return None
