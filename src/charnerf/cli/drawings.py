@@ -149,7 +149,10 @@ def given_drawings(
     drawings = {viewpoint(name): file for name, file in zip(names, files, strict=False)}
     for name, file in by_view:
         if viewpoint(name) in drawings:
-            raise ConfigError(f"--view {name}: found this view twice, expected one drawing of it.")
+            raise ConfigError(
+                f"--view {name}: found this view twice, expected one drawing of it. Leave one out, or give the azimuth that it is"
+                " seen from, such as --view 45=FILE."
+            )
         if not Path(file).is_file():
             raise ConfigError(f"--view {name}={file}: found no such file. Check the path.")
         drawings[viewpoint(name)] = Path(file)
@@ -162,7 +165,7 @@ def _pairs(texts: Sequence[str] | None, option: str) -> list[tuple[str, str]]:
     names = [name for name, _ in pairs]
     for name in names:
         if names.count(name) > 1:
-            raise ConfigError(f"{option} {name}: found this view twice, expected it once.")
+            raise ConfigError(f"{option} {name}: found this view twice, expected it once. Leave one out.")
     return pairs
 
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from charnerf.capture.character import capture_sources
 from charnerf.capture.poses import find_joints, random_pose, reposed
 from charnerf.data.characters import Character
-from charnerf.data.drawing_style import draw_pictures, random_style
+from charnerf.data.drawing_style import DrawingStyle, draw_pictures, random_style
 from charnerf.errors import ConfigError, DataError
 from charnerf.geometry.framing import SOURCE_AZIMUTHS
 from charnerf.pictures import save_png, to_bytes
@@ -138,6 +138,11 @@ def on_paper(images: Tensor, mistakes: Mistakes, *, seed: int) -> np.ndarray:
         return to_bytes(images.permute(0, 2, 3, 1))
     generator = torch.Generator().manual_seed(seed)
     style = random_style(generator, wobble=mistakes.wobble, shift=mistakes.shift, scale=mistakes.scale)
+    return in_style(images, style, generator)
+
+
+def in_style(images: Tensor, style: DrawingStyle, generator: torch.Generator) -> np.ndarray:
+    """Views (V, 4, S, S) drawn in a style on paper, RGB uint8 (V, S, S, 3)."""
     images = draw_pictures(images, style, generator)
     paper = torch.tensor(PAPER)[:, None, None] / 255.0
     rgb = images[:, :3] * images[:, 3:] + paper * (1.0 - images[:, 3:])

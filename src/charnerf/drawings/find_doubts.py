@@ -157,9 +157,11 @@ def _disagreements(agreement: Reconciliation, figures: Sequence[DrawnFigure]) ->
             sentence = (
                 f"its outline shares only {100 * view.iou_before:.0f} % with the mirrored"
                 f" {figures[view.partner].viewpoint.name}'s (IoU, expected {100 * LEAST_AGREEMENT:.0f} % or more): the drawings"
-                f" differ in pose, are not of one character, or were given in another order than front, side, back"
+                f" differ in pose, one is cut off, they are not of one character, or were given in another order than front, side,"
+                " back"
             )
-            end = "." if view.is_trusted else "; it could not be reconciled, colours may be misplaced."
+            apart = "" if view.is_trusted else "; it could not be reconciled, colours may be misplaced"
+            end = f"{apart}. Draw it whole and in the pose of the others, or leave it out."
             doubts.append(Doubt(name, sentence + end))
         if np.isinf(view.tolerance).all():
             doubts.append(

@@ -135,13 +135,15 @@ def _check_viewpoints(drawings: Mapping[Viewpoint, Picture]) -> None:
     for first, second in pairwise([*azimuths, azimuths[0] + 360.0]):
         if second - first < NEAR:
             raise DataError(
-                f"view {first:g}: found two drawings from this azimuth, expected one from each; leave one out, or say where it"
-                " is seen from."
+                f"view {first:g}: found two drawings from this azimuth, expected one from each. Leave one out, or say where it"
+                " is seen from, such as 45 degrees."
             )
     files = [str(source) for source in drawings.values() if not isinstance(source, np.ndarray)]
     for file in files:
         if files.count(file) > 1:
-            raise DataError(f"{file}: given for two views, expected another drawing for each.")
+            raise DataError(
+                f"{file}: given for two views, expected another drawing for each. Leave one of the views out."
+            )
 
 
 def _canvases(figures: Sequence[DrawnFigure], extent: float, size: int) -> list[np.ndarray]:

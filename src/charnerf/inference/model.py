@@ -87,7 +87,7 @@ class Model:
         }
         for name, one in (views or {}).items():
             if viewpoint(name) in drawings:
-                raise DataError(f"view {name}: found two drawings of it, expected one.")
+                raise DataError(f"view {name}: found two drawings of it, expected one. Leave one out.")
             drawings[viewpoint(name)] = one
         return self.encode_drawings(drawings)
 
