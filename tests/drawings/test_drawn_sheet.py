@@ -101,6 +101,17 @@ def test_edges_of_a_figure_are_no_lines_though_they_run_on_through_its_trunk():
     assert sum(right - left for left, _, right, _ in (one.box for one in lines)) > 400
 
 
+def test_a_hand_beyond_a_cuff_of_the_papers_colour_is_the_figures():
+    page = np.full((300, 1000, 3), 255, np.uint8)
+    for left in (100, 600):
+        page[60:240, left : left + 60] = page[120:135, left : left + 120] = (60, 90, 160)
+        page[120:135, left + 125 : left + 150] = (200, 140, 110)  # a hand, past the box, 5 pixels on
+        page[120:135, left + 200 : left + 225] = (200, 140, 110)  # a detail
+    found = find_figures(drawing_from_array(page, "sheet"))
+    assert [one.box[2] for one in found.figures] == [250, 750]
+    assert [one.reason for one in found.left_aside] == ["a swatch or a panel"] * 2
+
+
 def test_two_rows_are_read_row_by_row():
     pixels, boxes = sheet(["front", "side", "back", "right"], rows=2)
     found = find_figures(drawing_from_array(pixels, "sheet"))

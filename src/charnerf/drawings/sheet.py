@@ -17,6 +17,7 @@ from charnerf.errors import DataError
 
 MOST_FIGURES = 8
 JOINED = 0.0015  # share of the sheet's longer side: parts nearer to each other than this hang together
+BESIDE = 0.008  # share of it within which what is no figure belongs to one: a hand beyond a cuff of the paper's colour
 LINE_LENGTH = (
     0.35  # share of the sheet's side beyond which a thin straight run is a construction line or a frame
 )
@@ -86,7 +87,7 @@ def find_figures(drawing: Drawing) -> Sheet:
             f"{drawing.name}: found {len(chosen)} figures, expected at most {MOST_FIGURES}: crop it to the views of one"
             " character, or give them one by one with --view."
         )
-    owners = _owners(regions, chosen)
+    owners = _owners(regions, chosen, labels)
     order = _reading_order([regions[index].bbox for index in chosen])
     figures = []
     for place in order:
@@ -179,16 +180,21 @@ def _without_cut_off(
     return [i for i in chosen if i not in cut], reasons | dict.fromkeys(cut, "cut off by the border")
 
 
-def _owners(regions: Sequence[object], chosen: Sequence[int]) -> dict[int, int]:
-    """Which figure each region belongs to: small loose parts within a figure's box are the figure's."""
+def _owners(regions: Sequence[object], chosen: Sequence[int], labels: np.ndarray) -> dict[int, int]:
+    """Which figure each region belongs to: small loose parts within a figure's box, or next to it, are the figure's."""
     owners = {index: index for index in chosen}
+    apart = {
+        index: ndimage.distance_transform_edt(labels != regions[index].label)  # type: ignore[attr-defined]
+        for index in chosen
+    }
     for index, region in enumerate(regions):
         if index in owners:
             continue
         row, column = region.centroid  # type: ignore[attr-defined]
         for figure in chosen:
             top, left, bottom, right = regions[figure].bbox  # type: ignore[attr-defined]
-            if top <= row <= bottom and left <= column <= right:
+            is_within = top <= row <= bottom and left <= column <= right
+            if is_within or apart[figure][tuple(region.coords.T)].min() <= BESIDE * max(labels.shape):  # type: ignore[attr-defined]
                 owners[index] = figure
                 break
     return owners
