@@ -128,10 +128,14 @@ def read_right(sheet: Composed) -> Counter[str]:
     try:
         with NamedTemporaryFile(suffix=".jpg") as file:
             Path(file.name).write_bytes(sheet.page)
-            read = read_sheet(file.name)
-        is_right = _is_split(read, sheet) and _is_named(read, sheet) and _is_aligned(read, sheet)
+            return judged(read_sheet(file.name), sheet)
     except DataError:
         return Counter(("refused",))
+
+
+def judged(read: SheetViews, sheet: Composed) -> Counter[str]:
+    """Whether what was read is what was composed, and whether anything was asked."""
+    is_right = _is_split(read, sheet) and _is_named(read, sheet) and _is_aligned(read, sheet)
     return _counted(is_right, bool(read.warnings))
 
 
