@@ -40,6 +40,10 @@ def test_empty_and_unknown_splits_are_refused(tmp_path, split, found):
         ('{"format": "charnerf-dataset", "version": 1, "splits": {"a": "b"}}', "splits.a: found 'b'"),
         ('{"format": "charnerf-dataset", "version": 1, "splits": {"a": ["../b"]}}', "'../b'.*rename"),
         ('{"format": "charnerf-dataset", "version": 1, "splits": {"a": ["b", "b"]}}', "b more than once"),
+        (
+            '{"format": "charnerf-dataset", "version": 1, "splits": {"a": ["%s"]}}' % ("b" * 201),
+            "'b{100}': expected .* 200",
+        ),
     ],
 )
 def test_wrong_dataset_files_are_named(tmp_path, content, message):

@@ -52,7 +52,7 @@ def check_name(kind: str, name: str) -> None:
     """
     if not _NAME.fullmatch(name):
         raise DataError(
-            f"{kind} {name[:100]!r}: expected at most 200 letters, digits and _ - + . only, not beginning with a dot; "
+            f"{kind} {name[:100]!r}: expected letters, digits and _ - + . only, 200 at most, not beginning with a dot; "
             f"rename it."
         )
 
