@@ -122,3 +122,25 @@ def test_a_second_signal_ends_at_once():
     assert b"a second signal ends at once" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=10) == 130
+
+
+def test_a_process_of_a_library_ends_with_its_parent():
+    """joblib gives its processes a parent without the pipe that tells of its end."""
+    child = """
+    import os, time
+    from multiprocessing import process
+    from charnerf.interruption import end_with_parent
+    process._parent_process = process._ParentProcess("main", os.getppid(), None)
+    end_with_parent()
+    print("ready", flush=True)
+    time.sleep(60)
+    """
+    parent = """
+    import subprocess, sys
+    subprocess.Popen([sys.executable, "-c", sys.argv[1]], stdout=subprocess.PIPE).stdout.readline()
+    """
+    command = [sys.executable, "-c", textwrap.dedent(parent), textwrap.dedent(child)]
+    process = subprocess.run(
+        command, check=True, stderr=subprocess.PIPE, timeout=20
+    )  # until nobody has it open
+    assert b"Traceback" not in process.stderr

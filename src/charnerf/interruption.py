@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
+from multiprocessing.process import BaseProcess
 from types import FrameType
 from typing import NoReturn
 
@@ -145,7 +146,7 @@ def leave_signals_to_parent() -> None:
 @cache
 def end_with_parent() -> None:
     """Ask this process to end once its parent has, however that ended; what does not end then is ended."""
-    above, parent = os.getppid(), multiprocessing.parent_process()
+    above, parent = os.getppid(), _parent_with_pipe()
 
     def watch() -> None:
         # the process above may be one that starts others; the parent's pipe does not tell where others hold it too
@@ -158,6 +159,17 @@ def end_with_parent() -> None:
         os._exit(128 + signal.SIGTERM)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def _parent_with_pipe() -> BaseProcess | None:
+    """This process's parent where a pipe tells of its end; a library's own processes, such as joblib's, have none."""
+    parent = multiprocessing.parent_process()
+    try:
+        if parent is not None:
+            parent.is_alive()
+    except (TypeError, ValueError):  # of a pipe that is None
+        return None
+    return parent
 
 
 def _on_signal(number: int, _: FrameType | None) -> None:
