@@ -8,7 +8,7 @@ import pytest
 
 from charnerf.files import (
     cache_folder,
-    disk_words,
+    error_words,
     locked,
     write_aside,
     write_bytes,
@@ -118,7 +118,7 @@ def test_a_full_disk_is_named_by_what_is_written(tmp_path: Path, folder: str) ->
         piece.symlink_to("/dev/full")
         piece.write_bytes(bytes(10))
     place = tmp_path / folder if folder else tmp_path / "a.bin"
-    words = disk_words(caught.value)
+    words = error_words(caught.value)
     assert words.startswith(f"{place}: can not be written to (No space left on device), expected room;")
     assert "the same command again" in words and not list(tmp_path.iterdir())
 
@@ -126,10 +126,12 @@ def test_a_full_disk_is_named_by_what_is_written(tmp_path: Path, folder: str) ->
 def test_errors_of_the_system_are_sentences(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="Permission") as caught, write_folder_aside(tmp_path / "out") as aside:
         raise PermissionError(13, "Permission denied", str(aside / "a/b"))
-    assert disk_words(caught.value).startswith(f"{tmp_path}/out/a/b: can not be opened (Permission denied), ")
+    assert error_words(caught.value).startswith(
+        f"{tmp_path}/out/a/b: can not be opened (Permission denied), "
+    )
     with pytest.raises(FileNotFoundError) as missing, write_aside(tmp_path / "a"):
         (tmp_path / "b").read_bytes()
-    assert disk_words(missing.value) == str(missing.value) and str(tmp_path / "b") in str(missing.value)
+    assert error_words(missing.value) == str(missing.value) and str(tmp_path / "b") in str(missing.value)
 
 
 def test_a_place_that_can_not_be_written_to_is_named_and_not_the_one_aside(

@@ -166,8 +166,10 @@ def named_in_errors(path: Path, aside: Path) -> Iterator[None]:
         raise
 
 
-def disk_words(error: OSError) -> str:
-    """An error of the system as a message: the file, what was found, what was expected, what to do."""
+def error_words(error: BaseException) -> str:
+    """An error's message; of one of the system the file, what was found, what was expected, what to do."""
+    if not isinstance(error, OSError):
+        return str(error)
     where, found = error.filename or "the disk", error.strerror
     if error.errno in _NO_ROOM:
         return (

@@ -15,7 +15,7 @@ from multiprocessing.context import BaseContext
 from typing import Any, final
 
 from charnerf.errors import CharNeRFError
-from charnerf.files import disk_words
+from charnerf.files import error_words
 from charnerf.interruption import end_with_parent, leave_signals_to_parent
 from charnerf.progress import Moment, reported_to
 
@@ -107,10 +107,8 @@ def _answer(connection: Connection, make: Callable[..., Any], arguments: tuple[A
             with reported_to(_Teller(connection)):
                 made = make(*arguments) if made is None else made
                 answer = ("done", getattr(made, name)(**keywords))
-        except CharNeRFError as error:
-            answer = ("refused", str(error))
-        except OSError as error:
-            answer = ("refused", disk_words(error))
+        except (CharNeRFError, OSError) as error:
+            answer = ("refused", error_words(error))
         except Exception as error:
             traceback.print_exc(file=sys.stderr)
             answer = (

@@ -33,7 +33,7 @@ from charnerf.cli import (
 )
 from charnerf.cli.messages import quiet, say
 from charnerf.errors import CharNeRFError, ConfigError
-from charnerf.files import disk_words
+from charnerf.files import error_words
 from charnerf.interruption import Stopped, leave, listening
 from charnerf.process import limit_spinning
 from charnerf.wording import printable
@@ -133,9 +133,8 @@ def run(arguments: list[str]) -> int:
         if debug:
             traceback.print_exc()
         is_ours = isinstance(error, CharNeRFError | OSError)
-        message = disk_words(error) if isinstance(error, OSError) else str(error)
         kind = "" if is_ours else f"{type(error).__name__}: "
         hint = "" if is_ours or debug else " (--debug shows where)"
-        typer.echo(f"error: {kind}{printable(message)}{hint}", err=True)
+        typer.echo(f"error: {kind}{printable(error_words(error))}{hint}", err=True)
         return WRONG_CALL if isinstance(error, ConfigError) else FAILED
     return 0

@@ -21,7 +21,7 @@ from charnerf.config.hydra_internals import looks_only, read_arguments
 from charnerf.config.overrides import config_files, jobs_of, trusted_by
 from charnerf.config.validation import check_files, validate, warn_of_idle_settings
 from charnerf.errors import CharNeRFError, ConfigError
-from charnerf.files import disk_words
+from charnerf.files import error_words
 from charnerf.wording import counted, printable
 
 FAILED, WRONG_CALL = 1, 2
@@ -84,9 +84,8 @@ def run_door(function: Callable[[], object], *, arguments: Sequence[str], conf: 
             traceback.print_exc()
         is_ours = isinstance(error, CharNeRFError | HydraException | OmegaConfBaseException | OSError)
         kind = "" if is_ours else f"{type(error).__name__}: "
-        message = disk_words(error) if isinstance(error, OSError) else str(error)
         hint = "" if is_ours or debug else " (HYDRA_FULL_ERROR=1 shows where)"
-        sys.stderr.write(f"error: {kind}{printable(message)}{hint}\n")
+        sys.stderr.write(f"error: {kind}{printable(error_words(error))}{hint}\n")
         return (
             WRONG_CALL if isinstance(error, ConfigError | HydraException | OmegaConfBaseException) else FAILED
         )
