@@ -22,8 +22,6 @@ from charnerf.meshing.options import MeshOptions
 from charnerf.wording import counted
 
 if TYPE_CHECKING:
-    import torch
-
     from charnerf.data.characters import Character
 
 EXAMPLES = (
@@ -135,11 +133,11 @@ def command(
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
     run_views, run_resolution = _measured_by(run)
-    options, root = MeshOptions(resolution=resolution or run_resolution, height=None), data.opened()
+    options = MeshOptions(resolution=resolution or run_resolution, height=None)
     metrics = evaluate(
         model.network,
         model.renderer,
-        root,
+        data.opened(),
         split,
         views=num_views or run_views,
         output=output,
@@ -148,21 +146,10 @@ def command(
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=noted_seconds(run),
         redrawn=source_drawer(model.image_size),
-        processes=jobs or _processes(model.network.device, root, split),
+        processes=jobs,
     )
     _write(metrics, output, json_file, began)
     typer.echo(json.dumps(metrics, indent=2))
-
-
-def _processes(device: "torch.device", root: Path, split: str) -> int:
-    """How many characters are measured at once: a process takes seconds to start."""
-    import torch
-
-    from charnerf.data.layout import names_of, read_dataset
-
-    if device.type != "cpu":
-        return 1
-    return max(1, min(torch.get_num_threads(), len(names_of(read_dataset(root), split)) // 2))
 
 
 def _check(output: Path | None, json_file: Path | None, resolution: int | None) -> None:

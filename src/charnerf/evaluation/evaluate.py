@@ -17,7 +17,7 @@ from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.metrics_file import VIEWS_FILE, split_metrics, write_views
 from charnerf.evaluation.nearest import TrainingCharacters
 from charnerf.evaluation.pictures import save_pictures
-from charnerf.evaluation.side_by_side import measured_side_by_side
+from charnerf.evaluation.side_by_side import measured_side_by_side, processes_worth
 from charnerf.models.charnerf import CharNeRF
 from charnerf.progress import Progress
 from charnerf.volume.renderers.base import AbstractRenderer
@@ -44,7 +44,7 @@ def evaluate(
     train_seconds: float | None = None,
     redrawn: Callable[[Character], Character] = as_captured,
     share: Share = ALONE,
-    processes: int = 1,
+    processes: int | None = 1,
 ) -> dict[str, Any]:
     """Measure a model on a split; draws a bar with the time left, returns the content of metrics.json.
 
@@ -54,15 +54,14 @@ def evaluate(
         root: Folder of the data set.
         split: Of the data set.
         views: Fixed views a character, evenly chosen, or "all".
-        output: Folder for every view's metrics, `views.csv`, and in `images/NAME/` the predictions (RGBA, named like the data
-            set's pictures) and a contact sheet, `sheet.png`; None keeps none.
+        output: Folder for views.csv, and in images/NAME/ predictions (RGBA, named as the set's pictures) and sheet.png, or None.
         mesh: As `measure_character` takes it; without it figures of surfaces are null.
         baselines: As `measure_character` takes it.
         training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
         redrawn: Gives a character other source views, such as `drawings.redrawn` does.
         share: Which of the processes that measure the split together this is; each returns the numbers of all.
-        processes: How many, of one thread each, to start for this share; all arguments are sent to them. 1 measures in this one.
+        processes: How many, of one thread each, share it; all arguments are sent to them. None: as many as are worth their start.
 
     Raises:
         DataError: If the split is unknown or empty, or a file is missing or wrong.
@@ -72,6 +71,7 @@ def evaluate(
         measure_character, network, renderer, mesh=mesh, baselines=baselines, training=training, lpips=Lpips()
     )
     names = names_of(read_dataset(root), split)[share.process :: share.processes]
+    processes = processes or processes_worth(len(names), network.device)
     measure = partial(_measured, of_one, Path(root), redrawn, views, output)
     with Progress(f"evaluate {split}") as progress:
         results = _of_all(_every(measure, names, processes, progress), share)

@@ -13,6 +13,11 @@ Measure = Callable[[str], CharacterResult]
 """From a character's name to what was measured; sent to other processes."""
 
 
+def processes_worth(number: int, device: torch.device) -> int:
+    """How many of a number of characters are measured at once: a process takes seconds to start."""
+    return max(1, min(torch.get_num_threads(), number // 2)) if device.type == "cpu" else 1
+
+
 def measured_side_by_side(
     measure: Measure,
     names: Sequence[str],
