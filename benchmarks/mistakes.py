@@ -17,7 +17,7 @@ import numpy as np
 import torch
 
 from charnerf.data.characters import Character
-from charnerf.data.drawing_style import DrawingStyle, random_style
+from charnerf.data.drawing_style import EXACT, random_style
 from charnerf.drawings.artist import LEVELS, Mistakes, captured, in_style
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.redrawn import SIDE
@@ -30,17 +30,6 @@ from charnerf.meshing.build import build_mesh
 from charnerf.meshing.options import MeshOptions
 from charnerf.surfaces.mesh_files import load_surface_mesh
 
-PLAIN = DrawingStyle(
-    ink=0.0,
-    inner_ink=0.0,
-    ink_rgb=(0.0, 0.0, 0.0),
-    line_pixels=1.0,
-    tones=0,
-    saturation=1.0,
-    wobble=0.0,
-    shift=0.0,
-    scale=0.0,
-)
 PARTS = {  # fields of the style that are as the level has them; poses are no matter of style
     "paper alone": (),
     "tones and saturation": ("tones", "saturation"),
@@ -48,7 +37,7 @@ PARTS = {  # fields of the style that are as the level has them; poses are no ma
     "unsteady hand": ("wobble",),
     "place and size": ("shift", "scale"),
     "poses": (),
-    "all of them": tuple(PLAIN.__dataclass_fields__),
+    "all of them": tuple(EXACT.__dataclass_fields__),
 }
 POSED = ("poses", "all of them")  # measured as drawn too
 FIGURES = {
@@ -70,7 +59,7 @@ def drawn_with(part: str, character: Character, *, level: int, size: int, reconc
     images = captured(surface, azimuths, size=SIDE, mistakes=pose, rng=rng)
     generator = torch.Generator().manual_seed(sum(character.name.encode()))
     whole = random_style(generator, wobble=mistakes.wobble, shift=mistakes.shift, scale=mistakes.scale)
-    style = replace(PLAIN, **{field: getattr(whole, field) for field in PARTS[part]})
+    style = replace(EXACT, **{field: getattr(whole, field) for field in PARTS[part]})
     front, side, back = in_style(images, style, generator)
     options = ReadingOptions(reconciled=reconciled)
     read = read_views(turnaround(front, side, back), size=size, options=options)

@@ -38,10 +38,8 @@ SIDE = 384  # pixels of the drawings, so that a sheet is not reduced as it is re
 LEVELS = 3
 SMALLER = 0.92  # of the others' size that one figure may have
 NEAR = 8  # pixels by which a box may be off: a block of the JPEG
-ALIGNED, MODEL_SIDE = (
-    0.05,
-    128,
-)  # share of a figure's pixels that may lie farther than one the model sees from the composed one's
+MODEL_SIDE = 128  # pixels that the model sees of a figure
+ALIGNED = 0.05  # share of them that may lie farther than one from the composed figure's
 VERDICTS = ("right", "of them asked about", "wrong and asked about", "refused", "silently wrong")
 Cut = Mapping[str, np.ndarray]  # RGBA (H, W, 4) by name of the view
 

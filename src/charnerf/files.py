@@ -14,11 +14,8 @@ from charnerf.errors import DataError
 from charnerf.interruption import held
 
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # the opening of a pipe waits for nobody
-_NO_ROOM = (
-    errno.ENOSPC,
-    errno.EDQUOT,
-    errno.EFBIG,
-)  # of a disk, of a user's share, of what a process may write
+# of a disk, of a user's share, of what a process may write
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 MOST_TEXT = 64 * 2**20  # bytes of a file that is read whole, such as JSON
 

@@ -6,18 +6,12 @@ import pytest
 import torch
 
 from charnerf.data.augmentation.drawing import Drawing
-from charnerf.data.drawing_style import DrawingStyle, contour_ink, draw_pictures, edge_ink, random_style
-
-EXACT = DrawingStyle(
-    ink=0.0,
-    inner_ink=0.0,
-    ink_rgb=(0.0, 0.0, 0.0),
-    line_pixels=1.0,
-    tones=0,
-    saturation=1.0,
-    wobble=0.0,
-    shift=0.0,
-    scale=0.0,
+from charnerf.data.drawing_style import (
+    EXACT,
+    contour_ink,
+    draw_pictures,
+    edge_ink,
+    random_style,
 )
 
 

@@ -44,6 +44,20 @@ class DrawingStyle:
     scale: float
 
 
+EXACT = DrawingStyle(
+    ink=0.0,
+    inner_ink=0.0,
+    ink_rgb=(0.0, 0.0, 0.0),
+    line_pixels=1.0,
+    tones=0,
+    saturation=1.0,
+    wobble=0.0,
+    shift=0.0,
+    scale=0.0,
+)
+"""Gives pictures back as they are."""
+
+
 def random_style(generator: torch.Generator, *, wobble: float, shift: float, scale: float) -> DrawingStyle:
     """Draw a style; the bounds of a view's mistakes are given, as shares of the side."""
     draws = torch.rand(6, generator=generator).tolist()

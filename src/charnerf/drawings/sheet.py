@@ -22,9 +22,7 @@ LINE_LENGTH = (
     0.35  # share of the sheet's side beyond which a thin straight run is a construction line or a frame
 )
 LINE_WIDTH = 0.006
-LINE_SHARE = (
-    0.2  # of such a run that is thin; the rest lies across figures, whose own edges are thin in a few pixels
-)
+LINE_SHARE = 0.2  # of such a run that is thin: more than the few pixels of figures' edges that lie across
 LEAST_HEIGHT = 0.5  # of the tallest candidate's: what is smaller is a detail, a swatch or text
 ALIKE = 0.2  # relative difference of heights within which figures are drawn at one scale
 SOLID = 0.93  # share of its box that a swatch or a frame fills
