@@ -2,6 +2,10 @@
 
 import multiprocessing
 import os
+import signal
+import subprocess
+import sys
+import textwrap
 import time
 from functools import partial
 from pathlib import Path
@@ -47,3 +51,40 @@ def test_a_block_that_is_left_early_begins_nothing_more(error: BaseException | N
 def test_a_process_that_dies_is_told() -> None:
     with pytest.raises(DataError, match="worker process died"), in_processes(die, [3, 4], 2) as results:
         list(results)
+
+
+def linger(number: int, folder: Path) -> None:
+    (folder / f"begun{number}").touch()
+    try:
+        time.sleep(60.0)
+    finally:
+        time.sleep(0.5)
+        (folder / f"ended{number}").touch()
+
+
+def test_a_signal_to_all_processes_is_waited_for(tmp_path: Path) -> None:
+    """It ends the process that starts the others, which then tells nothing of their end."""
+    code = """
+    import sys
+    from functools import partial
+    from pathlib import Path
+    from charnerf.interruption import listening
+    from charnerf.parallel import in_processes
+    from tests.test_parallel import linger
+    folder = Path(sys.argv[1])
+    with listening():
+        try:
+            with in_processes(partial(linger, folder=folder), range(2), 2) as results:
+                list(results)
+        finally:
+            print(*sorted(path.name for path in folder.glob("ended*")))
+    """
+    root = Path(__file__).parents[1]
+    command = [sys.executable, "-c", textwrap.dedent(code), str(tmp_path)]
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, start_new_session=True) as process:
+        while len(list(tmp_path.glob("begun*"))) < 2:
+            assert process.poll() is None
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGTERM)
+        assert process.stdout is not None
+        assert process.stdout.read().split() == [b"ended0", b"ended1"]

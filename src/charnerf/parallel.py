@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.connection import Connection
 from typing import TypeVar
 
 import torch
@@ -24,7 +25,8 @@ def in_processes(
 ) -> Iterator[Iterator[tuple[Item, Result]]]:
     """Do work on items while the block runs; its target yields each with its result as it ends.
 
-    A block that is left early, by an error or a signal too, begins nothing more and waits for what is at hand.
+    A block that is left early, by an error or a signal too, begins nothing more and waits for what is at hand: until the processes
+    have ended, also where a signal to all of them has ended the one that starts them, whose word is all that a pool waits for.
 
     Args:
         work: Function, or a partial of one, that can be sent to another process.
@@ -39,7 +41,8 @@ def in_processes(
         yield ((item, work(item)) for item in items)
         return
     context = clean_processes(getattr(work, "func", work).__module__)
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_begin) as pool:
+    last, held_open = context.Pipe(duplex=False)  # the second end is open as long as a process is there
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(held_open,)) as pool:
         waiting = {pool.submit(_do, work, item): item for item in items}
         try:
             yield ((waiting[done], done.result()) for done in as_completed(waiting))
@@ -50,6 +53,9 @@ def in_processes(
             ) from err
         finally:
             pool.shutdown(cancel_futures=True)
+            held_open.close()
+            last.poll(None)
+            last.close()
 
 
 def _do(work: Callable[[Item], Result], item: Item) -> Result:
@@ -61,7 +67,7 @@ def _do(work: Callable[[Item], Result], item: Item) -> Result:
         os._exit(stop.status)  # the pool would go on with the next item
 
 
-def _begin() -> None:
+def _begin(_: Connection) -> None:
     """Use one thread, leave Ctrl-C to the parent, and end with that even if it is killed."""
     torch.set_num_threads(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
