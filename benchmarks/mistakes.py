@@ -26,7 +26,7 @@ from charnerf.drawings.viewpoints import turnaround
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.geometry.framing import SOURCE_AZIMUTHS
 from charnerf.inference import weights
-from charnerf.meshing.build import build_mesh
+from charnerf.meshing.build import find_surface
 from charnerf.meshing.options import MeshOptions
 from charnerf.surfaces.mesh_files import load_surface_mesh
 
@@ -77,7 +77,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, help="CSV file")
     options = parser.parse_args()
     model = weights.load(None)
-    mesh = partial(build_mesh, options=MeshOptions(height=None))
+    mesh = partial(find_surface, options=MeshOptions(height=None))
     with options.output.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, ["drawn with", "reconciled", *FIGURES.values()], lineterminator="\n")
         writer.writeheader()

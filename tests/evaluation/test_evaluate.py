@@ -20,9 +20,11 @@ from charnerf.types import LeftOut, RenderOutput
 from support.figures import BlindModel, HullModel, HullRenderer, WhiteRenderer, write_figure
 
 
-def make_mesh(scene, views):
+def find_surface(scene, views):
     assert views.images.shape[0] == 1
-    return SimpleNamespace(mesh=scene.hull.mesh, left_out=LeftOut(grid_cells=5, grid_cells_of=8))
+    return SimpleNamespace(
+        extraction=SimpleNamespace(mesh=scene.hull.mesh), left_out=LeftOut(grid_cells=5, grid_cells_of=8)
+    )
 
 
 class Broken:
@@ -47,7 +49,7 @@ def outcome(figure_dataset, tmp_path_factory):
         "test",
         views=4,
         output=output,
-        mesh=make_mesh,
+        mesh=find_surface,
         train_seconds=12.5,
     )
     return found, output
@@ -81,7 +83,7 @@ def test_two_processes_measure_what_one_does(outcome, figure_dataset, tmp_path):
         "test",
         views=4,
         output=tmp_path,
-        mesh=make_mesh,
+        mesh=find_surface,
         train_seconds=12.5,
         processes=3,
     )
@@ -183,7 +185,7 @@ def test_a_data_set_without_meshes_says_so(tmp_path):
         tmp_path,
         "test",
         views=1,
-        mesh=make_mesh,
+        mesh=find_surface,
         baselines=False,
     )
     assert found["f_score_reason"] == "the data set has no mesh of the character"

@@ -4,8 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from flip_evaluator import evaluate
 from PIL import Image
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
+from torchmetrics.functional.image import structural_similarity_index_measure
 
 from charnerf.errors import DataError, NumericalError, ShapeError
 from charnerf.evaluation import metrics
@@ -93,6 +95,39 @@ def test_flip_is_zero_for_equal_pictures_and_grows_with_the_error(pair):
     assert metrics.flip(truth, truth) == 0.0
     small, large = metrics.flip(0.5 * (prediction + truth), truth), metrics.flip(prediction, truth)
     assert 0.0 < small < large < 1.0
+
+
+@pytest.mark.parametrize("place", [(0, 20), (30, 33), (12, 14)])
+def test_pictures_are_judged_around_their_figures_as_whole(place):
+    """A figure on one colour in larger pictures: errors fall with the area alone, at edges and corners too."""
+    top, left = place
+    truth = torch.full((36, 40, 3), 0.9)
+    prediction = truth.clone()
+    generator = torch.Generator().manual_seed(5)
+    truth[top : top + 6, left : left + 5] = torch.rand(6, 5, 3, generator=generator)
+    prediction[top : top + 4, left : left + 7] = torch.rand(4, 7, 3, generator=generator)
+    far = torch.zeros(36, 40, dtype=torch.bool)
+    far[metrics.around_figures(prediction, truth, 0)] = True
+    assert far.sum() == 6 * 7
+    pairs = [(picture[None].movedim(-1, 1)) for picture in (prediction, truth)]
+    whole = structural_similarity_index_measure(*pairs, data_range=1.0)
+    assert metrics.ssim(prediction, truth) == pytest.approx(float(whole), abs=1e-6)
+    whole = evaluate(truth.numpy(), prediction.numpy(), "LDR", applyMagma=False)[1]
+    assert metrics.flip(prediction, truth) == pytest.approx(float(whole), abs=1e-7)
+
+
+def test_pictures_of_one_colour_are_alike():
+    grey = torch.full((40, 32, 3), 0.5)
+    assert metrics.ssim(grey, grey) == 1.0
+    assert metrics.flip(grey, grey) == 0.0
+
+
+def test_lpips_of_several_pictures_is_that_of_each(pair):
+    prediction, truth = pair
+    lpips, pictures = Lpips(), [prediction, truth, 1.0 - truth]
+    found = [one["lpips"] for one in lpips.of_all(pictures, truth)]
+    assert found == pytest.approx([lpips(one, truth)["lpips"] for one in pictures], abs=1e-6)
+    assert found[1] == 0.0 < found[0] < found[2]
 
 
 def test_lpips_is_as_its_authors_document():

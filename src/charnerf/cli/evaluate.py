@@ -126,7 +126,7 @@ def command(
     from charnerf.evaluation.evaluate import evaluate
     from charnerf.evaluation.nearest import TrainingCharacters
     from charnerf.inference.weights import run_folder
-    from charnerf.meshing.build import build_mesh
+    from charnerf.meshing.build import find_surface
 
     source_drawer = _source_drawer(drawn, sources, reading)
     _check(output, json_file, resolution)
@@ -141,7 +141,7 @@ def command(
         split,
         views=num_views or run_views,
         output=output,
-        mesh=partial(build_mesh, options=options) if mesh else None,
+        mesh=partial(find_surface, options=options) if mesh else None,
         baselines=baselines,
         training=TrainingCharacters([split_of(one) for one in nearest_from]) if nearest_from else None,
         train_seconds=noted_seconds(run),

@@ -19,18 +19,24 @@ from charnerf.evaluation.nearest import (
     NearestBaseline,
     TrainingCharacters,
 )
-from charnerf.evaluation.scores import MethodScores, missing_scores, score_views, to_cpu
+from charnerf.evaluation.scores import (
+    MethodScores,
+    missing_reasons,
+    missing_scores,
+    score_views,
+    to_cpu,
+)
 from charnerf.evaluation.surface_error import missing_surface, surface_scores, true_points
 from charnerf.evaluation.timing import Stopwatch
-from charnerf.meshing.build import BuiltMesh
+from charnerf.meshing.build import FoundSurface
 from charnerf.models.charnerf import CharNeRF
 from charnerf.scene import Scene
 from charnerf.types import LeftOut, RenderOutput, SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 OURS = "ours"
-MakeMesh = Callable[[Scene, SourceViews], BuiltMesh]
-"""From a scene and its drawings (B = 1) to its mesh."""
+FindSurface = Callable[[Scene, SourceViews], FoundSurface]
+"""From a scene and its drawings (B = 1) to its surface; distances to the true one know no colours."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,8 @@ class CharacterResult:
         pictures: Predictions (n), fields (H, W) on the CPU, of every method that draws.
         left_out: Work that was not done for ours.
         nearest: The training character that the baseline `nearest` took; None where it took none.
-        seconds: Of every execution of a stage: encode, render, mesh; hull_encode, hull_render; metrics, of all methods.
+        seconds: Of every execution of a stage: encode, render, mesh (its surface); hull_encode, hull_render; metrics, of all
+            methods.
         peaks_mib: Most memory that was held while a stage ran.
     """
 
@@ -73,7 +80,7 @@ def measure_character(
     character: Character,
     frames: Sequence[int],
     *,
-    mesh: MakeMesh | None = None,
+    mesh: FindSurface | None = None,
     baselines: bool = True,
     training: TrainingCharacters | None = None,
     lpips: Lpips | None = None,
@@ -86,7 +93,7 @@ def measure_character(
         renderer: Draws its scenes.
         character: With its drawings and true pictures.
         frames: Indices of the pictures to measure, as from `fixed_views`.
-        mesh: Makes a scene's mesh from it and its drawings, for Chamfer and F-score; None leaves them out.
+        mesh: Finds a scene's surface, for Chamfer and F-score; None leaves them out.
         baselines: Whether to measure `white`, `visual_hull` and `nearest` too.
         training: Characters that the model was trained on, for the baseline `nearest`; None leaves it out.
         lpips: Loaded here if not given.
@@ -125,7 +132,7 @@ def _ours(
     renderer: AbstractRenderer,
     character: Character,
     frames: Sequence[int],
-    mesh: MakeMesh | None,
+    mesh: FindSurface | None,
     watch: Stopwatch,
     on_picture: Callable[[], object],
 ) -> _Answer:
@@ -146,10 +153,10 @@ def _ours(
         return _Answer(pictures, "no mesh was made", left_out)
     try:
         with watch.stage("mesh"):
-            built = mesh(scene, sources)
+            found = mesh(scene, sources)
     except CharNeRFError as error:
         return _Answer(pictures, str(error), left_out)
-    return _Answer(pictures, built.mesh, left_out + built.left_out)
+    return _Answer(pictures, found.extraction.mesh, left_out + found.left_out)
 
 
 def _white(character: Character, frames: Sequence[int]) -> _Answer:
@@ -179,12 +186,15 @@ def _scores(
     truth = None if character.mesh_file is None else true_points(character.mesh_file)
     images = character.images(frames)
     angles = view_angles(character.cameras[list(frames)], character.sources).records()
+    by_method = score_views({method: answer.pictures for method, answer in answers.items()}, images, lpips)
     scores = {}
-    for method, answer in answers.items():
-        views, reasons = score_views(answer.pictures, images, lpips)
-        views = [{**metrics, **angle} for metrics, angle in zip(views, angles, strict=True)]
-        surface, missing = _surface_scores(answer.surface, truth, character)
-        scores[method] = MethodScores(views, surface, {**reasons, **missing})
+    for method, views in by_method.items():
+        surface, missing = _surface_scores(answers[method].surface, truth, character)
+        scores[method] = MethodScores(
+            [{**metrics, **angle} for metrics, angle in zip(views, angles, strict=True)],
+            surface,
+            {**missing_reasons(views, lpips), **missing},
+        )
     return scores
 
 

@@ -11,7 +11,7 @@ from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.data.sampler import Share
 from charnerf.distributed import gathered
-from charnerf.evaluation.character import CharacterResult, MakeMesh, measure_character
+from charnerf.evaluation.character import CharacterResult, FindSurface, measure_character
 from charnerf.evaluation.frames import fixed_views
 from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.metrics_file import VIEWS_FILE, split_metrics, write_views
@@ -38,7 +38,7 @@ def evaluate(
     *,
     views: int | Literal["all"],
     output: Path | None = None,
-    mesh: MakeMesh | None = None,
+    mesh: FindSurface | None = None,
     baselines: bool = True,
     training: TrainingCharacters | None = None,
     train_seconds: float | None = None,

@@ -1,5 +1,6 @@
 """Learned perceptual distance between pictures: AlexNet's, which comes with the package, and VGG's where its network is here."""
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import final
@@ -37,17 +38,17 @@ class AlexLpips(nn.Module):
         self.register_buffer("shift", torch.tensor(_SHIFT)[:, None, None])
         self.register_buffer("scale", torch.tensor(_SCALE)[:, None, None])
 
-    def forward(self, first: Tensor, second: Tensor) -> Tensor:
-        """Distances (N,) of pictures (N, 3, H, W) in [0, 1], LEAST_SIDE a side or more."""
-        x = (2.0 * torch.cat((first, second)) - 1.0 - self.shift) / self.scale
-        total = x.new_zeros(len(first))
+    def forward(self, pictures: Tensor, truth: Tensor) -> Tensor:
+        """Distances (N,) of pictures (N, 3, H, W) from one (1, 3, H, W), in [0, 1], LEAST_SIDE a side or more."""
+        x = (2.0 * torch.cat((pictures, truth)) - 1.0 - self.shift) / self.scale
+        total = x.new_zeros(len(pictures))
         for index, (stride, padding, is_pooled) in enumerate(zip(_STRIDES, _PADDINGS, _POOLED, strict=True)):
             if is_pooled:
                 x = F.max_pool2d(x, 3, stride=2)
             weight, bias = getattr(self, f"conv{index}_weight"), getattr(self, f"conv{index}_bias")
             x = F.conv2d(x, weight, bias, stride=stride, padding=padding).relu()
             unit = x / (x.square().sum(1, keepdim=True).sqrt() + 1e-10)
-            squared = (unit[: len(first)] - unit[len(first) :]).square()
+            squared = (unit[:-1] - unit[-1:]).square()
             head = getattr(self, f"head{index}_weight")[:, None, None]
             total = total + (squared * head).sum(1).mean((-1, -2))
         return total
@@ -72,25 +73,37 @@ class Lpips:
 
             self._vgg = LearnedPerceptualImagePatchSimilarity(net_type="vgg", normalize=True).eval()
 
-    @torch.no_grad()
     def __call__(self, prediction: Tensor, truth: Tensor) -> dict[str, float | None]:
-        """`lpips` (AlexNet) and `lpips_vgg` of two pictures (H, W, 3) in [0, 1]; None without VGG's network or too small.
+        """What `of_all` says of one picture."""
+        return self.of_all([prediction], truth)[0]
+
+    @torch.no_grad()
+    def of_all(self, predictions: Sequence[Tensor], truth: Tensor) -> list[dict[str, float | None]]:
+        """`lpips` (AlexNet) and `lpips_vgg` of pictures from a true one; None without VGG's network or too small.
+
+        Args:
+            predictions: (H, W, 3) each, in [0, 1].
+            truth: (H, W, 3), in [0, 1]; AlexNet sees it once for all of them.
 
         Raises:
             DataError: If values leave [0, 1].
             NumericalError: If values are not finite.
             ShapeError: If the shapes differ.
         """
-        check_pair(prediction, truth)
-        pair = [
+        for prediction in predictions:
+            check_pair(prediction, truth)
+        if min(truth.shape[:2]) < LEAST_SIDE:
+            return [{"lpips": None, "lpips_vgg": None} for _ in predictions]
+        *pictures, true = (
             picture.detach().cpu().float().clamp(0.0, 1.0).movedim(-1, 0)[None]
-            for picture in (prediction, truth)
+            for picture in (*predictions, truth)
+        )
+        return [
+            {"lpips": distance, "lpips_vgg": None if self._vgg is None else float(self._vgg(picture, true))}
+            for distance, picture in zip(
+                self._alex(torch.cat(pictures), true).tolist(), pictures, strict=True
+            )
         ]
-        is_large = min(prediction.shape[:2]) >= LEAST_SIDE
-        return {
-            "lpips": float(self._alex(*pair)) if is_large else None,
-            "lpips_vgg": float(self._vgg(*pair)) if is_large and self._vgg is not None else None,
-        }
 
 
 def _why_missing() -> str | None:

@@ -24,6 +24,10 @@ HAZE = (0.05, 0.95)
 """Opacities between which a pixel is neither clear nor opaque."""
 HAZE_MARGIN = 2.0
 """Pixels beside an outline that may be either."""
+WINDOW_RADIUS = 5
+"""Pixels around one that its structural similarity sees."""
+FLIP_RADIUS = 10
+"""Pixels around one that its FLIP error sees: three deviations of the widest filter at 67 pixels per degree."""
 MIN_SQUARED_ERROR = 1e-10
 """Mean squared errors below this count as this: equal pictures have 100 dB, so that means stay finite."""
 
@@ -113,8 +117,28 @@ def psnr_union(prediction: Tensor, truth: Tensor, opacity: Tensor, true_alpha: T
     return _decibels((prediction[shown].double() - truth[shown].double()).square())
 
 
+def around_figures(prediction: Tensor, truth: Tensor, margin: int) -> tuple[slice, slice]:
+    """Rows and columns of two pictures (H, W, 3) beyond which both show nothing but one colour, that of their corner.
+
+    Errors of a pixel that sees no farther than the margin are those of the whole picture there, and none elsewhere.
+
+    Args:
+        prediction: (H, W, 3).
+        truth: (H, W, 3).
+        margin: Pixels that are kept around what either shows; of pictures of one colour, so many of their corner.
+    """
+    shown = ((prediction != truth[0, 0]) | (truth != truth[0, 0])).any(dim=-1)
+    ranges = []
+    for axis in (1, 0):
+        places = shown.any(dim=axis).nonzero()[:, 0].tolist() or [0]
+        ranges.append(slice(max(0, places[0] - margin), places[-1] + 1 + margin))
+    return ranges[0], ranges[1]
+
+
 def ssim(prediction: Tensor, truth: Tensor) -> float:
     """Structural similarity, Gaussian window of 11 pixels with sigma 1.5, mean over pixels and colours.
+
+    Where both pictures show one colour alone it is 1, and not computed.
 
     Raises:
         DataError: If values leave [0, 1].
@@ -127,14 +151,19 @@ def ssim(prediction: Tensor, truth: Tensor) -> float:
     from torchmetrics.functional.image import structural_similarity_index_measure
 
     check_pair(prediction, truth)
-    pictures = [picture.float().movedim(-1, 0)[None].contiguous() for picture in (prediction, truth)]
+    kept = around_figures(
+        prediction, truth, WINDOW_RADIUS + 1
+    )  # beyond edges a picture is continued mirrored
+    pictures = [picture[kept].float().movedim(-1, 0)[None].contiguous() for picture in (prediction, truth)]
     value = structural_similarity_index_measure(pictures[0], pictures[1], data_range=1.0)
     assert isinstance(value, Tensor)
-    return float(value)
+    return 1.0 - (1.0 - float(value)) * pictures[0].numel() / truth.numel()
 
 
 def flip(prediction: Tensor, truth: Tensor) -> float:
     """Mean FLIP error of a picture, 0 (equal) to 1, at the evaluator's default of 67 pixels per degree.
+
+    Where both pictures show one colour alone it is 0, and not computed.
 
     Raises:
         DataError: If values leave [0, 1].
@@ -146,11 +175,13 @@ def flip(prediction: Tensor, truth: Tensor) -> float:
     from flip_evaluator import evaluate
 
     check_pair(prediction, truth)
+    kept = around_figures(prediction, truth, FLIP_RADIUS)
     test, reference = (
-        np.ascontiguousarray(picture.detach().clamp(0.0, 1.0).cpu().numpy(), dtype=np.float32)
+        np.ascontiguousarray(picture[kept].detach().clamp(0.0, 1.0).cpu().numpy(), dtype=np.float32)
         for picture in (prediction, truth)
     )
-    return float(evaluate(reference, test, "LDR", applyMagma=False)[1])
+    share = test.size / truth.numel()
+    return share * float(evaluate(reference, test, "LDR", applyMagma=False)[1])
 
 
 def silhouette_iou(opacity: Tensor, true_alpha: Tensor) -> float:

@@ -62,10 +62,17 @@ def to_cpu(output: RenderOutput, *, name: str) -> RenderOutput:
 
 
 def score_views(
-    predictions: Sequence[RenderOutput], images: Tensor, lpips: Lpips
-) -> tuple[list[dict[str, float | None]], dict[str, str]]:
-    """VIEW_KEYS of predictions against the true bytes (n, H, W, 4), and why a key is missing."""
-    scores = [_score_view(*pair, lpips) for pair in zip(predictions, images, strict=True)]
+    predictions: Mapping[str, Sequence[RenderOutput]], images: Tensor, lpips: Lpips
+) -> dict[str, list[dict[str, float | None]]]:
+    """VIEW_KEYS of every method's predictions (n) against the true bytes (n, H, W, 4)."""
+    scores = [
+        _score_view(view, image, lpips) for *view, image in zip(*predictions.values(), images, strict=True)
+    ]
+    return dict(zip(predictions, map(list, zip(*scores, strict=True)), strict=True))
+
+
+def missing_reasons(scores: Sequence[Record], lpips: Lpips) -> dict[str, str]:
+    """Why a key of VIEW_KEYS is missing in a view's scores."""
     reasons = {
         "lpips": f"the pictures have fewer than {LEAST_SIDE} pixels a side",
         "lpips_vgg": lpips.vgg_reason or f"the pictures have fewer than {LEAST_SIDE} pixels a side",
@@ -74,18 +81,29 @@ def score_views(
         "haze": "the picture is empty",
     }
     missing = {key for each in scores for key, value in each.items() if value is None}
-    return scores, {key: str(reason) for key, reason in reasons.items() if key in missing}
+    return {key: str(reason) for key, reason in reasons.items() if key in missing}
 
 
-def _score_view(prediction: RenderOutput, image: Tensor, lpips: Lpips) -> dict[str, float | None]:
+def _score_view(
+    predictions: Sequence[RenderOutput], image: Tensor, lpips: Lpips
+) -> list[dict[str, float | None]]:
+    """The scores of every method at one view."""
     rgba = image.float() / 255.0
     truth, alpha = on_white(rgba), rgba[..., 3]
+    distances = lpips.of_all([one.rgb for one in predictions], truth)
+    return [
+        _score(prediction, truth, alpha) | distance
+        for prediction, distance in zip(predictions, distances, strict=True)
+    ]
+
+
+def _score(prediction: RenderOutput, truth: Tensor, alpha: Tensor) -> dict[str, float | None]:
+    """The scores of a picture that need no network."""
     return {
         "psnr": metrics.psnr(prediction.rgb, truth),
         "psnr_foreground": metrics.psnr_foreground(prediction.rgb, truth, alpha),
         "psnr_union": metrics.psnr_union(prediction.rgb, truth, prediction.opacity, alpha),
         "ssim": metrics.ssim(prediction.rgb, truth),
-        **lpips(prediction.rgb, truth),
         "flip": metrics.flip(prediction.rgb, truth),
         "silhouette_iou": metrics.silhouette_iou(prediction.opacity, alpha),
         "haze": metrics.haze(prediction.opacity),

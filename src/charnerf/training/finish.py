@@ -3,6 +3,7 @@
 import logging
 import shlex
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,15 @@ from charnerf.errors import NumericalError
 from charnerf.evaluation.evaluate import evaluate
 from charnerf.evaluation.metrics_file import write_metrics
 from charnerf.evaluation.nearest import TrainingCharacters
-from charnerf.meshing.build import BuiltMesh, build_mesh
+from charnerf.meshing.build import build_mesh, find_surface
 from charnerf.meshing.export import save_mesh
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.models.charnerf import CharNeRF
 from charnerf.reporting.formats import seconds_text
 from charnerf.reporting.run_report import write_run_report
-from charnerf.scene import Scene
 from charnerf.training.board import Board
 from charnerf.training.threads import ThreadTuner
-from charnerf.types import SourceViews
 from charnerf.volume.renderers.base import AbstractRenderer
 
 log = logging.getLogger(__name__)
@@ -58,10 +57,6 @@ def finish_run(
         trainer: That trained it.
         board: Gets the mesh and the final figures.
     """
-
-    def make_mesh(scene: Scene, views: SourceViews) -> BuiltMesh:
-        return build_mesh(scene, views, MeshOptions(resolution=cfg.scale.mesh_resolution, height=None))
-
     metrics = evaluate(
         model,
         renderer,
@@ -69,7 +64,7 @@ def finish_run(
         cfg.splits.test,
         views=cfg.scale.eval_views or "all",
         output=folder,
-        mesh=make_mesh,
+        mesh=partial(find_surface, options=MeshOptions(resolution=cfg.scale.mesh_resolution, height=None)),
         training=TrainingCharacters([(root, split) for split in cfg.splits.train]),
         train_seconds=train_seconds,
         share=Share(trainer.global_rank, trainer.world_size),
