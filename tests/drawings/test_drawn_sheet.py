@@ -101,6 +101,24 @@ def test_edges_of_a_figure_are_no_lines_though_they_run_on_through_its_trunk():
     assert sum(right - left for left, _, right, _ in (one.box for one in lines)) > 400
 
 
+def test_an_antenna_ends_in_its_figure_and_an_axis_goes_through_it():
+    page = np.full((300, 600, 3), 255, np.uint8)
+    for left in (100, 300):
+        page[100:250, left : left + 60] = (60, 90, 160)
+        page[60:100, left + 10 : left + 13] = (
+            60,
+            90,
+            160,
+        )  # with the trunk below it longer than a line is at least
+    page[40:270, 330:332] = (150, 150, 200)
+    found = find_figures(drawing_from_array(page, "sheet"))
+    assert [one.box for one in found.figures] == [(100, 60, 160, 250), (300, 60, 360, 250)]
+    assert [one.box for one in found.left_aside if one.reason == "a line"] == [
+        (330, 40, 332, 100),
+        (330, 250, 332, 270),
+    ]
+
+
 def test_a_hand_beyond_a_cuff_of_the_papers_colour_is_the_figures():
     page = np.full((300, 1000, 3), 255, np.uint8)
     for left in (100, 600):

@@ -124,16 +124,27 @@ def _without_lines(ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _thin_runs(mask: np.ndarray, length: int, thickest: int) -> np.ndarray:
-    """Thin pixels of a mask's straight horizontal runs of at least a length; gaps of two pixels (JPEG noise) do not end a run."""
+    """Thin pixels of a mask's straight horizontal runs of at least a length that are lines; gaps of two pixels (JPEG noise) do not
+    end a run."""
     closed = ndimage.binary_closing(mask, structure=np.ones((1, 3), dtype=bool))
-    thin = mask & ~ndimage.binary_opening(mask, structure=np.ones((thickest + 1, 1), dtype=bool))
+    thick = ndimage.binary_opening(mask, structure=np.ones((thickest + 1, 1), dtype=bool))
+    thin = mask & ~thick
     runs = np.zeros_like(mask)
     for row in np.flatnonzero(closed.sum(axis=1) >= length):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], closed[row].astype(np.int8), [0]))))
         for start, end in zip(edges[::2], edges[1::2], strict=True):
-            if end - start >= length and thin[row, start:end].sum() >= LINE_SHARE * (end - start):
+            count = thin[row, start:end].sum()
+            if end - start < length or count < LINE_SHARE * (end - start):
+                continue
+            if count >= length or _goes_through(thick[row, start:end], thickest):
                 runs[row, start:end] = True
     return runs & thin
+
+
+def _goes_through(thick: np.ndarray, least: int) -> bool:
+    """Whether a run, thick (L,) bool where it crosses something, comes out of it at both ends: an antenna ends in its figure."""
+    crossed = np.flatnonzero(thick)
+    return not len(crossed) or min(crossed[0], len(thick) - 1 - crossed[-1]) > least
 
 
 def _choose(regions: Sequence[object]) -> tuple[list[int], dict[int, str]]:
