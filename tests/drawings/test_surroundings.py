@@ -148,6 +148,16 @@ def test_a_gap_that_compression_blurs_stays_open(tmp_path):
     assert found.rgba[240:320, 200, 3].max() < 0.5
 
 
+def test_color_that_compression_spreads_is_no_part_of_the_figure(tmp_path):
+    """JPEG stores colour at half the size, so that yellow soles bleed up to 16 pixels far into bluish paper."""
+    for down in (306, 318):
+        picture = Image.new("RGB", (SIZE, SIZE), (214, 220, 228))
+        ImageDraw.Draw(picture).rectangle((160, 100, 239, down), fill=(150, 60, 50))
+        ImageDraw.Draw(picture).rectangle((160, 300, 239, down), fill=(255, 212, 64))
+        found = saved(tmp_path, picture, "drawing.jpg", quality=60).rgba[..., 3] > 0.5
+        assert found.sum() == pytest.approx(80 * (down - 99), rel=0.005), down
+
+
 def test_pale_clothes_stay_closed_in_a_jpeg(tmp_path):
     picture = Image.new("RGB", (SIZE, SIZE), (255, 255, 255))
     draw_figure(picture)

@@ -22,6 +22,8 @@ HALO_TOLERANCE = 6.0  # CIELAB distance; about what JPEG and resizing do to a fl
 HALO_WIDTH = {False: 3, True: 8}  # pixels that such a halo is wide, without and with lossy compression
 RINGING = 0.12  # of the contrast of an edge, which compression leaves beside it
 BLOCK = 8  # pixels: as far as that reaches
+BLEEDING = 0.3  # of the colourfulness beside it, which compression leaves in paper that is as light as ever
+COLOR_BLOCK = 16  # pixels: as far as that reaches, since colour is stored at half the size
 GREY = 4.0  # CIELAB chroma up to which a cell of a checkerboard is grey
 CELLS = 5  # cells along a border, at least, that make a checkerboard
 REGULAR = 0.95  # share of the border's pixels that must lie as the checkerboard says
@@ -78,7 +80,13 @@ def find_background(drawing: Drawing) -> Background:
     noise = np.percentile(distance[ring][inlier], 99.0)
     tolerance = float(np.clip(1.5 * noise, LEAST_TOLERANCE, MODE_TOLERANCE))
     return Background(
-        mask=_connected(distance, tolerance, ring, lossy=drawing.lossy),
+        mask=_connected(
+            _near(distance, lab - paper, tolerance, lossy=drawing.lossy),
+            distance,
+            tolerance,
+            ring,
+            lossy=drawing.lossy,
+        ),
         distance=distance,
         tolerance=tolerance,
         rgb=np.median(rgb[ring][inlier], axis=0),
@@ -88,11 +96,21 @@ def find_background(drawing: Drawing) -> Background:
     )
 
 
-def _connected(distance: np.ndarray, tolerance: float, ring: np.ndarray, *, lossy: bool) -> np.ndarray:
-    """What is near enough to the background's colour, by its distance (H, W), and connected to the border, (H, W) bool."""
+def _near(distance: np.ndarray, offset: np.ndarray, tolerance: float, *, lossy: bool) -> np.ndarray:
+    """What is near enough to the background's colour, by its distance (H, W) and its offset (H, W, 3) from that, (H, W) bool."""
     near = distance <= tolerance
-    if lossy:  # beside strong edges compression rings, by a share of their contrast
+    if lossy:  # beside strong edges compression rings, by a share of their contrast; farther off it does in colour alone
         near |= distance <= RINGING * ndimage.maximum_filter(distance, 2 * BLOCK + 1)
+        chroma = np.linalg.norm(offset[..., 1:], axis=-1)
+        bled = chroma <= BLEEDING * ndimage.maximum_filter(chroma, 2 * COLOR_BLOCK + 1)
+        near |= bled & (np.abs(offset[..., 0]) <= LEAST_TOLERANCE)
+    return near
+
+
+def _connected(
+    near: np.ndarray, distance: np.ndarray, tolerance: float, ring: np.ndarray, *, lossy: bool
+) -> np.ndarray:
+    """What is near (H, W) bool to the background's colour and connected to the border, and its halo, (H, W) bool."""
     regions = label(near, connectivity=1)
     outside = np.unique(regions[ring & (regions > 0)])
     mask = np.isin(regions, outside[outside > 0])
