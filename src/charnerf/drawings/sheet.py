@@ -5,13 +5,14 @@ Letters: H, W of the sheet.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
 from skimage.measure import label, regionprops
 
 from charnerf.drawings.background import find_background
-from charnerf.drawings.cutout import has_alpha
+from charnerf.drawings.cutout import SPECK_SHARE, has_alpha
 from charnerf.drawings.load import Drawing
 from charnerf.errors import DataError
 
@@ -124,8 +125,7 @@ def _without_lines(ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _thin_runs(mask: np.ndarray, length: int, thickest: int) -> np.ndarray:
-    """Thin pixels of a mask's straight horizontal runs of at least a length that are lines; gaps of two pixels (JPEG noise) do not
-    end a run."""
+    """Thin pixels of a mask's straight horizontal lines of at least a length; gaps of two pixels (JPEG noise) do not end one."""
     closed = ndimage.binary_closing(mask, structure=np.ones((1, 3), dtype=bool))
     thick = ndimage.binary_opening(mask, structure=np.ones((thickest + 1, 1), dtype=bool))
     thin = mask & ~thick
@@ -147,14 +147,14 @@ def _goes_through(thick: np.ndarray, least: int) -> bool:
     return not len(crossed) or min(crossed[0], len(thick) - 1 - crossed[-1]) > least
 
 
-def _choose(regions: Sequence[object]) -> tuple[list[int], dict[int, str]]:
+def _choose(regions: Sequence[Any]) -> tuple[list[int], dict[int, str]]:
     """Indices of the regions that are figures, and why the others are none."""
-    heights = np.array([one.bbox[2] - one.bbox[0] for one in regions], dtype=np.float64)  # type: ignore[attr-defined]
+    heights = np.array([one.bbox[2] - one.bbox[0] for one in regions], dtype=np.float64)
     reasons: dict[int, str] = {}
     candidates = []
     for index, region in enumerate(regions):
-        height, width = heights[index], region.bbox[3] - region.bbox[1]  # type: ignore[attr-defined]
-        if region.area >= SOLID * height * width:  # type: ignore[attr-defined]
+        height, width = heights[index], region.bbox[3] - region.bbox[1]
+        if region.area >= SOLID * height * width:
             reasons[index] = "a swatch or a panel"
         else:
             candidates.append(index)
@@ -174,11 +174,11 @@ def _choose(regions: Sequence[object]) -> tuple[list[int], dict[int, str]]:
 
 
 def _without_cut_off(
-    regions: Sequence[object], chosen: list[int], reasons: dict[int, str], shape: tuple[int, ...]
+    regions: Sequence[Any], chosen: list[int], reasons: dict[int, str], shape: tuple[int, ...]
 ) -> tuple[list[int], dict[int, str]]:
     """Figures that the sheet's border cuts off are none, where at least two whole ones stay."""
     height, width = shape[:2]
-    boxes = {i: regions[i].bbox for i in chosen}  # type: ignore[attr-defined]
+    boxes = {i: regions[i].bbox for i in chosen}
     cut = [
         i
         for i, (top, left, down, right) in boxes.items()
@@ -189,24 +189,32 @@ def _without_cut_off(
     return [i for i in chosen if i not in cut], reasons | dict.fromkeys(cut, "cut off by the border")
 
 
-def _owners(regions: Sequence[object], chosen: Sequence[int], labels: np.ndarray) -> dict[int, int]:
-    """Which figure each region belongs to: small loose parts within a figure's box, or next to it, are the figure's."""
+def _owners(regions: Sequence[Any], chosen: Sequence[int], labels: np.ndarray) -> dict[int, int]:
+    """Which figure each region belongs to.
+
+    Small loose parts within a figure's box are the figure's, and so is what lies next to it, or next to that: bones beyond bones.
+    Specks are nobody's.
+    """
+    least = SPECK_SHARE * min((regions[index].area for index in chosen), default=0.0)
+    parts = [index for index, one in enumerate(regions) if one.area >= least]
+    drawn = np.isin(labels, [regions[index].label for index in parts])
+    groups = label(ndimage.distance_transform_edt(~drawn) <= 0.5 * BESIDE * max(labels.shape), connectivity=2)
+    group_of = {index: groups[tuple(regions[index].coords[0])] for index in parts}
     owners = {index: index for index in chosen}
-    apart = {
-        index: ndimage.distance_transform_edt(labels != regions[index].label)  # type: ignore[attr-defined]
-        for index in chosen
-    }
-    for index, region in enumerate(regions):
-        if index in owners:
-            continue
-        row, column = region.centroid  # type: ignore[attr-defined]
-        for figure in chosen:
-            top, left, bottom, right = regions[figure].bbox  # type: ignore[attr-defined]
-            is_within = top <= row <= bottom and left <= column <= right
-            if is_within or apart[figure][tuple(region.coords.T)].min() <= BESIDE * max(labels.shape):  # type: ignore[attr-defined]
-                owners[index] = figure
-                break
+    for index in parts:
+        row, column = regions[index].centroid
+        boxes = {figure: regions[figure].bbox for figure in chosen}
+        within = [i for i, box in boxes.items() if box[0] <= row <= box[2] and box[1] <= column <= box[3]]
+        near = within or [i for i in chosen if group_of[i] == group_of[index]]
+        if near:
+            nearest = min(near, key=lambda i: _apart(boxes[i], regions[index].bbox))
+            owners.setdefault(index, nearest)
     return owners
+
+
+def _apart(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> int:
+    """Pixels between two boxes (top, left, bottom, right); 0 or less where they overlap."""
+    return max(one[0] - other[2], other[0] - one[2], one[1] - other[3], other[1] - one[3])
 
 
 def _reading_order(boxes: Sequence[tuple[int, int, int, int]]) -> list[int]:
