@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -47,6 +48,10 @@ FIGURES = {
     "haze": "haze",
     "chamfer_mm": "Chamfer mm",
 }
+OF_DRAWINGS = {
+    "psnr": "drawings dB",
+    "silhouette_iou": "drawings IoU",
+}  # themselves, from where they were drawn
 DECIMALS = {"silhouette_iou": 3, "haze": 3, "chamfer_mm": 1}
 
 
@@ -66,6 +71,10 @@ def drawn_with(part: str, character: Character, *, level: int, size: int, reconc
     return replace(character, sources=read.views)
 
 
+def _texts(found: Mapping[str, float], titles: Mapping[str, str]) -> dict[str, str]:
+    return {title: f"{found[key]:.{DECIMALS.get(key, 2)}f}" for key, title in titles.items()}
+
+
 def main() -> None:
     """Measure what the command line names; every row is written as soon as it is there."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -79,7 +88,8 @@ def main() -> None:
     model = weights.load(None)
     mesh = partial(find_surface, options=MeshOptions(height=None))
     with options.output.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, ["drawn with", "reconciled", *FIGURES.values()], lineterminator="\n")
+        titles = ["drawn with", "reconciled", *OF_DRAWINGS.values(), *FIGURES.values()]
+        writer = csv.DictWriter(file, titles, lineterminator="\n")
         writer.writeheader()
         for part in options.part or PARTS:
             for reconciled in (True, False) if part in POSED else (True,):
@@ -96,7 +106,7 @@ def main() -> None:
                     baselines=False,
                     redrawn=redrawn,
                 )
-                figures = {title: f"{found[key]:.{DECIMALS.get(key, 2)}f}" for key, title in FIGURES.items()}
+                figures = _texts(found["drawings"], OF_DRAWINGS) | _texts(found, FIGURES)
                 writer.writerow({"drawn with": part, "reconciled": "yes" if reconciled else "no", **figures})
                 file.flush()
                 sys.stderr.write(f"{part}: {figures}\n")

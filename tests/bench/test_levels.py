@@ -6,6 +6,7 @@ import torch
 from charnerf.bench.levels import METRICS, VIEWS, characters_of, drawn_levels
 from charnerf.evaluation.character import OURS, measure_character
 from charnerf.evaluation.frames import fixed_views
+from charnerf.evaluation.lpips import Lpips
 from charnerf.volume.renderers.culled import CulledRenderer
 from support import tiny_models
 from support.subjects import LIKE
@@ -20,7 +21,9 @@ def test_a_level_is_a_row_and_level_0_is_as_captured(tmp_path):
     rows = drawn_levels(network, renderer, [character], levels=(0, 2))
     assert [row["level"] for row in rows] == [0, 2]
     views = (
-        measure_character(network, renderer, character, fixed_views(character, VIEWS), baselines=False)
+        measure_character(
+            network, renderer, character, fixed_views(character, VIEWS), lpips=Lpips(), baselines=False
+        )
         .scores[OURS]
         .views
     )

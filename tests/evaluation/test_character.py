@@ -4,6 +4,7 @@ import pytest
 
 from charnerf.data.characters import load_character
 from charnerf.evaluation.character import CharacterResult, measure_character
+from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.nearest import NO_TRAINING_SET, TrainingCharacters
 from support.figures import HullModel, HullRenderer
 
@@ -16,7 +17,7 @@ def doll(figure_dataset):
 
 
 def measured(character, **options) -> CharacterResult:
-    return measure_character(HullModel(), HullRenderer(), character, FRAMES, **options)
+    return measure_character(HullModel(), HullRenderer(), character, FRAMES, lpips=Lpips(), **options)
 
 
 @pytest.fixture(scope="module")

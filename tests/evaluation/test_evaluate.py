@@ -1,6 +1,7 @@
 import csv
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -199,3 +200,21 @@ def test_metrics_are_written_whole_or_not_at_all(tmp_path):
         write_metrics(path, {"psnr": math.nan})
     assert json.loads(path.read_text()) == {"psnr": 1.5}
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_drawings_themselves_are_measured_where_views_are_drawn(figure_dataset, outcome):
+    def blank(character):
+        nothing = replace(character.sources, images=torch.zeros_like(character.sources.images))
+        return replace(character, sources=nothing if character.name == "doll" else replace(character.sources))
+
+    found = evaluate(
+        HullModel(), HullRenderer(), figure_dataset, "test", views=1, baselines=False, redrawn=blank
+    )
+    assert "drawings" not in outcome[0]
+    doll = load_character(figure_dataset, "doll").sources.images[0].permute(0, 2, 3, 1)
+    squared = ((on_white(doll) - 1.0) ** 2).mean(dim=(1, 2, 3))
+    assert found["drawings"]["psnr"] == pytest.approx(
+        (100.0 - 10.0 * squared.log10().mean().item()) / 2.0, abs=0.01
+    )
+    assert found["drawings"]["silhouette_iou"] == pytest.approx(0.5)
+    assert found["drawings"]["chamfer_mm_reason"] == "drawings have no surface"

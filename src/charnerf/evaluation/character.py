@@ -11,6 +11,7 @@ from charnerf.data.characters import Character
 from charnerf.errors import CharNeRFError
 from charnerf.evaluation.angles import view_angles
 from charnerf.evaluation.baselines import VisualHullBaseline, white_prediction
+from charnerf.evaluation.drawing_scores import score_drawings
 from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.nearest import (
     NO_MATCH,
@@ -50,6 +51,7 @@ class CharacterResult:
         pictures: Predictions (n), fields (H, W) on the CPU, of every method that draws.
         left_out: Work that was not done for ours.
         nearest: The training character that the baseline `nearest` took; None where it took none.
+        drawings: Of the drawings themselves, from where they were drawn; None where the source views are the captured ones.
         seconds: Of every execution of a stage: encode, render, mesh (its surface); hull_encode, hull_render; metrics, of all
             methods.
         peaks_mib: Most memory that was held while a stage ran.
@@ -61,6 +63,7 @@ class CharacterResult:
     pictures: Mapping[str, Sequence[RenderOutput]]
     left_out: LeftOut
     nearest: Nearest | None
+    drawings: MethodScores | None
     seconds: Mapping[str, Sequence[float]]
     peaks_mib: Mapping[str, float]
 
@@ -80,10 +83,11 @@ def measure_character(
     character: Character,
     frames: Sequence[int],
     *,
+    lpips: Lpips,
     mesh: FindSurface | None = None,
     baselines: bool = True,
     training: TrainingCharacters | None = None,
-    lpips: Lpips | None = None,
+    captured: Character | None = None,
     on_picture: Callable[[], object] = lambda: None,
 ) -> CharacterResult:
     """Measure a model on a character: every metric of every frame, of the surface, seconds and memory.
@@ -93,10 +97,11 @@ def measure_character(
         renderer: Draws its scenes.
         character: With its drawings and true pictures.
         frames: Indices of the pictures to measure, as from `fixed_views`.
+        lpips: As of `score_views`.
         mesh: Finds a scene's surface, for Chamfer and F-score; None leaves them out.
         baselines: Whether to measure `white`, `visual_hull` and `nearest` too.
         training: Characters that the model was trained on, for the baseline `nearest`; None leaves it out.
-        lpips: Loaded here if not given.
+        captured: The character before its source views were drawn, to measure the drawings themselves; None leaves that out.
         on_picture: Called after every picture of ours.
 
     Raises:
@@ -104,14 +109,11 @@ def measure_character(
     """
     nearest = training.nearest(character) if baselines and training is not None else None
     with Stopwatch(network.device) as watch:
-        answers = {OURS: _ours(network, renderer, character, frames, mesh, watch, on_picture)}
-        if baselines:
-            answers["white"] = _white(character, frames)
-            answers["visual_hull"] = _visual_hull(character, frames, watch)
-        if nearest is not None:
-            answers["nearest"] = _nearest(nearest, character, frames)
+        answers = _without_learning(character, frames, nearest, watch) if baselines else {}
+        answers = {OURS: _ours(network, renderer, character, frames, mesh, watch, on_picture)} | answers
         with watch.stage("metrics"):
-            scores = _scores(answers, character, frames, lpips or Lpips())
+            scores = _scores(answers, character, frames, lpips)
+            drawings = None if captured is None else score_drawings(character, captured, lpips)
     if baselines and nearest is None:
         scores["nearest"] = missing_scores(NO_TRAINING_SET if training is None else NO_MATCH)
     return CharacterResult(
@@ -121,6 +123,7 @@ def measure_character(
         pictures={method: answer.pictures for method, answer in answers.items()},
         left_out=answers[OURS].left_out,
         nearest=nearest,
+        drawings=drawings,
         seconds=watch.seconds(),
         peaks_mib=watch.peaks_mib(),
     )
@@ -157,6 +160,16 @@ def _ours(
     except CharNeRFError as error:
         return _Answer(pictures, str(error), left_out)
     return _Answer(pictures, found.extraction.mesh, left_out + found.left_out)
+
+
+def _without_learning(
+    character: Character, frames: Sequence[int], nearest: Nearest | None, watch: Stopwatch
+) -> dict[str, _Answer]:
+    """What a user has without a model, the nearest training character where there is one."""
+    answers = {"white": _white(character, frames), "visual_hull": _visual_hull(character, frames, watch)}
+    if nearest is not None:
+        answers["nearest"] = _nearest(nearest, character, frames)
+    return answers
 
 
 def _white(character: Character, frames: Sequence[int]) -> _Answer:

@@ -108,9 +108,11 @@ def _measured(
     counter: Callable[[int], Callable[[], object]] = _uncounted,
 ) -> CharacterResult:
     """Measure a character, and keep its pictures in files alone: they take memory."""
-    character = redrawn(load_character(root, name))
+    captured = load_character(root, name)
+    character = redrawn(captured)
     frames = fixed_views(character, views)
-    result = measure(character, frames, on_picture=counter(len(frames)))
+    before = None if character is captured else captured
+    result = measure(character, frames, captured=before, on_picture=counter(len(frames)))
     if output is not None:
         save_pictures(output / "images" / character.name, character, frames, result.pictures)
     return replace(result, pictures={})

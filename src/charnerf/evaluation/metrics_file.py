@@ -34,6 +34,7 @@ def split_metrics(
     count = min(processes, len(results))
     ours = [result.scores[OURS] for result in results]
     views = [scores.views for scores in ours]
+    drawings = [result.drawings for result in results if result.drawings is not None]
     return {
         "split": split,
         "num_characters": len(results),
@@ -47,6 +48,7 @@ def split_metrics(
             for result, scores in zip(results, ours, strict=True)
         },
         "baselines": _baselines(results),
+        **({"drawings": summarize(drawings)} if drawings else {}),
         "seconds": _seconds(results, train_seconds),
         **_memory(results, device),
         "left_out": _left_out(sum((result.left_out for result in results), LeftOut())),

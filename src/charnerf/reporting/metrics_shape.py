@@ -30,6 +30,7 @@ def check_metrics(metrics: Mapping[str, Any], file: Path) -> None:
                 check_name(f"{file}: per_character:", one)
                 if missing := [key for key in METRIC_KEYS if key not in figures]:
                     raise DataError(f"{where}: lacks {', '.join(missing)}; evaluate again.")
+    _check_scores(_object(metrics.get("drawings", {}), f"{file}: drawings"), f"{file}: drawings")
     _object(metrics.get("environment", {}), f"{file}: environment")
     _check_scores({key: value for key, value in metrics.items() if key not in _TABLES}, str(file))
 

@@ -77,6 +77,8 @@ def _headline(metrics: Mapping[str, Any]) -> Table:
     header = ["", *(title for title, _ in COLUMNS.values()), "encode", "a frame"]
     rows = [("charnerf", metrics)]
     rows += [(BASELINE_NAMES.get(name, name), each) for name, each in metrics.get("baselines", {}).items()]
+    if "drawings" in metrics:
+        rows.append(("the drawings themselves, from where they were drawn", metrics["drawings"]))
     cells = []
     for name, scores in rows:
         spent = scores.get("seconds", {})
