@@ -7,7 +7,17 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from charnerf.models.fused import pair_dots, read_bags, residual_rows, score_rows, sum_views
+from charnerf.models.fused import (
+    linear_of_columns,
+    once,
+    pair_dots,
+    read_bags,
+    residual_rows,
+    score_views,
+    softmax_views,
+    sum_views,
+    view_cosines,
+)
 
 
 def rand(*shape: int) -> Tensor:
@@ -42,13 +52,47 @@ def test_residual_rows(rows: int) -> None:
     )
 
 
-@pytest.mark.parametrize("rows", [0, 1, 37])
-def test_score_rows(rows: int) -> None:
-    def plain(x: Tensor, addend: Tensor, w: Tensor, b: Tensor, ws: Tensor, bs: Tensor) -> Tensor:
-        return F.linear((F.linear(x, w, b) + addend).relu(), ws, bs)[:, 0]
+@pytest.mark.parametrize("points", [0, 1, 13])
+@pytest.mark.parametrize("alike", [False, True])
+def test_score_views(points: int, alike: bool) -> None:
+    def plain(x: Tensor, addend: Tensor, w: Tensor, ws: Tensor, bs: Tensor) -> Tensor:
+        return F.linear((F.linear(x, w) + addend).relu(), ws, bs)[..., 0]
 
+    addend = rand(1 if alike else points, 3, 5)
     assert_equal_with_gradients(
-        score_rows, plain, rand(rows, 8), rand(rows, 5), rand(5, 8), rand(5), rand(1, 5), rand(1)
+        score_views, plain, rand(points, 3, 8), addend, rand(5, 8), rand(1, 5), rand(1)
+    )
+
+
+@pytest.mark.parametrize("points", [0, 1, 13])
+@pytest.mark.parametrize("views", [1, 4])
+def test_softmax_over_views(views: int, points: int) -> None:
+    logits = rand(points, views)
+    logits[:1, 1:] = -torch.inf
+    assert_equal_with_gradients(softmax_views, lambda x: torch.softmax(x, dim=-1), logits)
+
+
+@pytest.mark.parametrize("alike", [False, True])
+def test_cosines_of_views(alike: bool) -> None:
+    """Of directions that are alike for all points, too."""
+    sources = rand(1 if alike else 13, 4, 3)
+    assert_equal_with_gradients(view_cosines, lambda d, s: (d[:, None] * s).sum(-1), rand(13, 3), sources)
+
+
+def test_what_was_expanded_is_taken_once() -> None:
+    rows = rand(1, 4, 3)
+    assert once(rows.expand(7, -1, -1)).shape == (1, 4, 3)
+    assert once(rand(7, 4, 3)).shape == (7, 4, 3)
+    assert once(rows.expand(0, -1, -1)).shape == (0, 4, 3)
+
+
+@pytest.mark.parametrize("points", [0, 1, 13])
+def test_linear_layers_of_columns(points: int) -> None:
+    """Whether the features lie point by point or feature by feature in memory."""
+    assert_equal_with_gradients(linear_of_columns, lambda x, w: x @ w.t(), rand(points, 4, 6), rand(5, 6))
+    columns = rand(6, points, 4).permute(1, 2, 0)
+    assert torch.allclose(
+        linear_of_columns(columns, rand(5, 6)), columns @ rand(5, 6).t(), rtol=0, atol=1e-12
     )
 
 
@@ -106,7 +150,7 @@ def test_autocast_runs_the_plain_forms() -> None:
     x, w = torch.randn(6, 8, requires_grad=True), torch.randn(8, 8)
     with torch.autocast("cpu", torch.bfloat16):
         residual = residual_rows(x, w, w[0], w, w[1])
-        scores = score_rows(x, x, w, w[0], w[:1], w[0, :1])
+        scores = score_views(x[:, None], x[:, None], w, w[:1], w[0, :1])
         summed = sum_views(torch.rand(6, 2), x[:, None].expand(-1, 2, -1))
     (residual.sum() + scores.sum() + summed.sum()).backward()
     assert x.grad is not None and bool(x.grad.isfinite().all())

@@ -24,13 +24,38 @@ def residual_rows(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> 
     return _Residual.apply(x, w1, b1, w2, b2)  # type: ignore[no-any-return, no-untyped-call]
 
 
-def score_rows(x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
-    """`relu(x W' + b + addend) w' + b_score` of rows x (N, D) with addends (N, H): one score each, (N,)."""
-    if torch.is_autocast_enabled(x.device.type):
-        return F.linear((F.linear(x, w, b) + addend).relu(), w_score, b_score)[:, 0]
+def score_views(features: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
+    """`relu(x W' + addend) w' + b_score` of features x (P, V, D): a score each, (P, V); addends broadcast to (P, V, H)."""
+    if torch.is_autocast_enabled(features.device.type):
+        return F.linear((F.linear(features, w) + addend).relu(), w_score, b_score)[..., 0]
     if not torch.is_grad_enabled():
-        return _score(x, addend, w, b, w_score, b_score)[0]
-    return _Score.apply(x, addend, w, b, w_score, b_score)  # type: ignore[no-any-return, no-untyped-call]
+        return _score(features, addend, w, w_score, b_score)[0]
+    rows = features.reshape(-1, features.shape[-1])
+    addends = addend.expand(*features.shape[:-1], -1).reshape(-1, addend.shape[-1])
+    scores: Tensor = _Score.apply(rows, addends, w, w_score, b_score)  # type: ignore[no-untyped-call]
+    return scores.view(features.shape[:-1])
+
+
+def linear_of_columns(features: Tensor, w: Tensor) -> Tensor:
+    """`x W'` of features x (P, V, E), read without a copy where they lie feature by feature in memory: (P, V, D)."""
+    columns = features.permute(2, 0, 1).reshape(features.shape[2], -1)
+    return (columns.t() @ w.t()).view(*features.shape[:2], len(w))
+
+
+def once(rows: Tensor) -> Tensor:
+    """Rows (P, ...) that were expanded from one as that one, (1, ...), others as they are: what is alike costs one row."""
+    return rows[:1] if len(rows) and rows.stride(0) == 0 else rows
+
+
+def view_cosines(view_dirs: Tensor, source_dirs: Tensor) -> Tensor:
+    """Cosines (P, V) of unit directions (P, 3) and (P, V, 3), column by column: sums over an axis of three are slow."""
+    x, y, z = (view_dirs[:, axis, None] * source_dirs[..., axis] for axis in range(3))
+    return x + y + z
+
+
+def softmax_views(logits: Tensor) -> Tensor:
+    """Softmax over the views of logits (P, V), points in a row: along an axis of three or four it costs thirty times as much."""
+    return torch.softmax(logits.t().contiguous(), dim=0).t()
 
 
 def sum_views(weights: Tensor, features: Tensor) -> Tensor:
@@ -69,12 +94,12 @@ def _residual(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> tupl
     return torch.add(x, b2).addmm_(hidden, w2.t()), rectified, hidden
 
 
-def _score(
-    x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor, b_score: Tensor
-) -> tuple[Tensor, Tensor]:
-    """The scores, and what they are made of."""
-    hidden = torch.add(addend, b).addmm_(x, w.t()).relu_()
-    return torch.addmm(b_score, hidden, w_score.t())[:, 0], hidden
+def _score(x: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> tuple[Tensor, Tensor]:
+    """The scores (...) of x (..., D), and the rows that they are made of."""
+    leading = x.shape[:-1]
+    rows = x.reshape(-1, x.shape[-1]) @ w.t()
+    rows.view(*leading, len(w)).add_(addend).relu_()
+    return torch.addmm(b_score, rows, w_score.t()).view(leading), rows
 
 
 def _sum_views(weights: Tensor, features: Tensor) -> Tensor:
@@ -112,10 +137,8 @@ class _Residual(torch.autograd.Function):
 
 class _Score(torch.autograd.Function):
     @staticmethod
-    def forward(
-        ctx: Any, x: Tensor, addend: Tensor, w: Tensor, b: Tensor, w_score: Tensor, b_score: Tensor
-    ) -> Tensor:
-        scores, hidden = _score(x, addend, w, b, w_score, b_score)
+    def forward(ctx: Any, x: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
+        scores, hidden = _score(x, addend, w, w_score, b_score)
         ctx.save_for_backward(x, hidden, w, w_score)
         return scores
 
@@ -125,7 +148,7 @@ class _Score(torch.autograd.Function):
         x, hidden, w, w_score = ctx.saved_tensors
         column = grad[:, None]
         inner = _where_positive_(column * w_score, hidden)
-        return inner @ w, inner, inner.t() @ x, inner.sum(0), column.t() @ hidden, grad.sum(0, keepdim=True)
+        return inner @ w, inner, inner.t() @ x, column.t() @ hidden, grad.sum(0, keepdim=True)
 
 
 class _SumViews(torch.autograd.Function):

@@ -2,11 +2,11 @@
 
 from typing import final
 
-import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from charnerf.models.combinators.base import AbstractWeighing, masked_logits
-from charnerf.models.fused import score_rows, sum_views
+from charnerf.models.fused import once, score_views, softmax_views, sum_views, view_cosines
 
 
 @final
@@ -36,14 +36,10 @@ class LearnedWeights(AbstractWeighing):
         self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
     ) -> Tensor:
         """Weights (P, V) by which the views are averaged."""
-        cosines = (view_dirs[:, None] * source_dirs).sum(-1, keepdim=True)
-        angles = self.from_angles(torch.cat((cosines, source_dirs), dim=-1))
-        logits = score_rows(
-            view_features.reshape(-1, view_features.shape[-1]),
-            angles.reshape(-1, angles.shape[-1]),
-            self.from_features.weight,
-            self.from_features.bias,
-            self.score.weight,
-            self.score.bias,
-        ).view(valid.shape)
-        return torch.softmax(masked_logits(logits, valid), dim=-1)
+        sources, weight = once(source_dirs), self.from_angles.weight
+        cosines = view_cosines(once(view_dirs), sources)
+        angles = F.linear(sources, weight[:, 1:], self.from_features.bias) + cosines[..., None] * weight[:, 0]
+        logits = score_views(
+            view_features, angles, self.from_features.weight, self.score.weight, self.score.bias
+        )
+        return softmax_views(masked_logits(logits, valid))

@@ -6,6 +6,7 @@ from torch import Tensor, nn
 
 from charnerf.models.combinators.base import AbstractCombinator
 from charnerf.models.density.base import AbstractDensity, TrunkOutput
+from charnerf.models.fused import once
 from charnerf.models.inputs import PointViews
 from charnerf.models.mlp import ResidualBlock
 from charnerf.models.stages import DIRECTION_FREQUENCIES, encode_directions
@@ -32,7 +33,7 @@ class ViewFreeDensity(AbstractDensity):
         self, trunk: TrunkOutput, views: PointViews, view_dirs: Tensor, combinator: AbstractCombinator
     ) -> Tensor:
         """The trunk's features, the direction, and what the combinator answers to it, through the colour block."""
-        directed = trunk.features + self.from_dirs(encode_directions(view_dirs))
+        directed = trunk.features + self.from_dirs(encode_directions(once(view_dirs)))
         if combinator.sees_query:
             directed = directed + combinator(trunk.view_features, view_dirs, views.dirs, views.valid)
         return self.color(directed)

@@ -25,14 +25,20 @@ class ImageHullFeatures(AbstractFeatures):
     reads_hull = True
 
     def __call__(self, inputs: FieldInputs) -> Tensor:
-        """Return (P, V, 16)."""
-        depths = [torch.tanh(scale * inputs.views.behind) for scale in DEPTH_SCALES]
-        edges = [torch.tanh(scale * inputs.edge) for scale in EDGE_SCALES]
+        """Return (P, V, 16), feature by feature in memory."""
         has_no_say = (inputs.mirrored > 0) & (inputs.mirrored == 0).any()
-        smallest = (
-            inputs.edge.masked_fill(has_no_say, torch.inf).amin(-1, keepdim=True).expand_as(inputs.edge)
+        smallest = inputs.edge.masked_fill(has_no_say, torch.inf).amin(-1, keepdim=True)
+        planes = (
+            _at_scales(inputs.views.behind, DEPTH_SCALES),
+            _at_scales(inputs.edge, EDGE_SCALES),
+            _at_scales(smallest, EDGE_SCALES).expand(-1, *inputs.edge.shape),
+            inputs.mirrored.expand(1, *inputs.edge.shape),
+            (2.0 * inputs.views.rgb - 1.0).permute(2, 0, 1),
+            inputs.views.dirs.permute(2, 0, 1),
         )
-        smallests = [torch.tanh(scale * smallest) for scale in EDGE_SCALES]
-        mirrored = inputs.mirrored.expand_as(inputs.views.behind)
-        scalars = torch.stack((*depths, *edges, *smallests, mirrored), dim=-1)
-        return torch.cat((scalars, 2.0 * inputs.views.rgb - 1.0, inputs.views.dirs), dim=-1)
+        return torch.cat(planes).permute(1, 2, 0)
+
+
+def _at_scales(values: Tensor, scales: tuple[float, ...]) -> Tensor:
+    """Values (P, V) times scales (S), bounded, (S, P, V)."""
+    return torch.tanh(values * values.new_tensor(scales)[:, None, None])

@@ -29,10 +29,11 @@ class ImageHullSectionFeatures(AbstractFeatures):
         self.image_hull = ImageHullFeatures()
 
     def __call__(self, inputs: FieldInputs) -> Tensor:
-        """Return (P, V, 28)."""
+        """Return (P, V, 28), feature by feature in memory."""
         places, halves = inputs.section_places, inputs.section_lengths
         squares = places.square()
         lengths = (torch.log2(halves.clamp_min(LEAST_LENGTH) / LENGTH_SCALE) / 3.0).clamp(-1.0, 1.0)
         section = torch.cat((places, squares, squares + squares.roll(1, dims=-1), lengths), dim=-1)
         by_view = self.image_hull(inputs)
-        return torch.cat((by_view, section[:, None].expand(-1, by_view.shape[1], -1)), dim=-1)
+        alike = section.t()[..., None].expand(-1, -1, by_view.shape[1])
+        return torch.cat((by_view.permute(2, 0, 1), alike)).permute(1, 2, 0)

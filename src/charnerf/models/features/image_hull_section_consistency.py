@@ -28,8 +28,9 @@ class ImageHullSectionConsistencyFeatures(AbstractFeatures):
         self.image_hull_section = ImageHullSectionFeatures()
 
     def __call__(self, inputs: FieldInputs) -> Tensor:
-        """Return (P, V, 36)."""
-        return torch.cat((self.image_hull_section(inputs), consistency(inputs.views.rgb)), dim=-1)
+        """Return (P, V, 36), feature by feature in memory."""
+        parts = self.image_hull_section(inputs), consistency(inputs.views.rgb)
+        return torch.cat([part.permute(2, 0, 1) for part in parts]).permute(1, 2, 0)
 
 
 def consistency(rgb: Tensor) -> Tensor:

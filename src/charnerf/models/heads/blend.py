@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from charnerf.models.combinators.base import masked_logits
-from charnerf.models.fused import score_rows
+from charnerf.models.fused import once, score_views, view_cosines
 from charnerf.models.heads.base import AbstractHead
 from charnerf.models.inputs import PointViews
 
@@ -36,26 +36,23 @@ class BlendHead(AbstractHead):
     ) -> Tensor:
         """Scores of the views, then the free colour and the gate before their sigmoids, (P, V + 4)."""
         visibility = views.visibility
-        cosines = (view_dirs[:, None] * views.dirs).sum(-1, keepdim=True)
-        readings = torch.cat((cosines, visibility[..., None], views.rgb), dim=-1)
-        addend = self.from_readings(readings) + self.from_features(features)[:, None]
-        scores = score_rows(
-            view_features.reshape(-1, view_features.shape[-1]),
-            addend.reshape(-1, addend.shape[-1]),
+        cosines = view_cosines(once(view_dirs), once(views.dirs)).expand_as(visibility)
+        readings = torch.cat((torch.stack((cosines, visibility), dim=-1), views.rgb), dim=-1)
+        of_all = F.linear(features, self.from_features.weight, self.from_views.bias)
+        scores = score_views(
+            view_features,
+            self.from_readings(readings) + of_all[:, None],
             self.from_views.weight,
-            self.from_views.bias,
             self.score.weight,
             self.score.bias,
         )
-        logits = scores.view(views.valid.shape) + 2.0 * visibility
+        logits = scores + 2.0 * visibility
         return torch.cat((masked_logits(logits, views.valid), self.free(F.relu(features))), dim=-1)
 
     @staticmethod
     def rgb_of(appearance: Tensor, drawn: Tensor) -> Tensor:
         """The drawings' colours by the softmax of their scores, and the free one by its gate."""
-        logits, free = appearance[:, :-4], appearance[:, -4:]
-        blended = (torch.softmax(logits, dim=-1)[..., None] * drawn).sum(1)
-        return blended + torch.sigmoid(free[:, 3:]) * (torch.sigmoid(free[:, :3]) - blended)
+        return BlendHead.rgb_planes(appearance.t().contiguous(), drawn.permute(1, 2, 0)).t()
 
     @staticmethod
     def rgb_planes(appearance: Tensor, drawn: Tensor) -> Tensor:

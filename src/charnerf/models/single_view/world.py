@@ -6,6 +6,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from charnerf.geometry.encoding import positional_encoding
+from charnerf.models.fused import linear_of_columns
 from charnerf.models.inputs import FieldInputs
 from charnerf.models.mlp import residual_blocks
 from charnerf.models.single_view.base import AbstractSingleView
@@ -46,5 +47,5 @@ class WorldSingleView(AbstractSingleView):
         )
         x = inputs.latents + located[:, None]
         if self.from_point_features is not None:
-            x = x.add_(self.from_point_features(point_features))
+            x = x.add_(linear_of_columns(point_features, self.from_point_features.weight))
         return self.blocks(x)
