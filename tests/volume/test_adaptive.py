@@ -11,10 +11,11 @@ from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.cameras import pixel_centres, pixel_rays
 from charnerf.scene import AbstractField, FunctionField, Scene
 from charnerf.types import FieldOutput, Hull, RayBundle
+from charnerf.volume.marching import OccupiedRays, coarse_samples
 from charnerf.volume.quadrature import PiecewiseConstant
 from charnerf.volume.renderers.adaptive import POINTS_A_STAGE, AdaptiveRenderer, _columns_of_stage
 from charnerf.volume.renderers.culled import CulledRenderer
-from charnerf.volume.renderers.refinement import march, split_bins
+from charnerf.volume.renderers.refinement import error_of_equal_bins, march, split_bins
 from support import helpers, tiny_models
 
 BOX = (torch.tensor((-1.8, -1.8, -0.8)), torch.tensor((1.8, 1.8, 2.8)))
@@ -134,6 +135,62 @@ def test_what_is_returned_may_enter_a_gradient():
     (gain * rendering.finest.rgb).sum().backward()
     (gain[0] * (rendering.finest.opacity + rendering.estimate.estimated)).sum().backward()
     assert gain.grad is not None and bool(gain.grad.isfinite().all())
+
+
+NARROW = Bounds(torch.tensor((-0.2, -0.2, 0.8)), torch.tensor((0.2, 0.2, 1.2)))
+
+
+def few_rays() -> RayBundle:
+    """Rays of all directions through points of a box that is 0.4 m wide."""
+    generator = torch.Generator().manual_seed(0)
+    across = torch.randn(80, 3, generator=generator)
+    directions = across / across.norm(dim=-1, keepdim=True)
+    through = torch.tensor(helpers.CENTRE) + 0.3 * (torch.rand(80, 3, generator=generator) - 0.5)
+    return RayBundle(through - 2.0 * directions, directions)
+
+
+@pytest.mark.parametrize(("tolerance", "samples"), [(0.2, 12), (0.05, 24), (0.01, 54)])
+def test_where_refinement_buys_nothing_few_rays_take_exactly_the_samples_of_culled(tolerance, samples):
+    scene = Scene(FunctionField(FIELDS["fog"]), None, NARROW)
+    with torch.no_grad():
+        ours = adaptive(tolerance).render(scene, few_rays())
+        theirs = CulledRenderer(**COMMON, num_coarse=samples, hull_steps=128).render(scene, few_rays())
+    for name in ("rgb", "opacity", "depth"):
+        assert torch.equal(getattr(ours.finest, name), getattr(theirs.finest, name)), name
+    assert ours.estimate is not None and ours.estimate.num_unresolved == 0
+    assert ours.estimate.num_samples == theirs.left_out.samples_of - theirs.left_out.samples > 0
+
+
+def test_where_densities_are_stiff_few_rays_take_more_samples_and_err_less():
+    def sheet(points: torch.Tensor, dirs: torch.Tensor) -> FieldOutput:
+        return FieldOutput(striped(points), 240.0 * torch.exp(-(((points[:, 0] - 0.013) / 0.005) ** 2)))
+
+    scene, rays, tolerance = Scene(FunctionField(sheet), None, NARROW), few_rays(), 0.02
+    with torch.no_grad():
+        ours = adaptive(tolerance).render(scene, rays)
+        theirs = CulledRenderer(**COMMON, num_coarse=36, hull_steps=128).render(scene, rays)
+        exact = converged(scene, rays)
+    off, of_culled = ((one.finest.rgb - exact).abs().amax(-1) for one in (ours, theirs))
+    assert of_culled.max() > tolerance >= off.max()
+    changed = (ours.finest.rgb != theirs.finest.rgb).any(-1)
+    assert 0 < int(changed.sum()) < len(changed)
+    evaluated = theirs.left_out.samples_of - theirs.left_out.samples
+    assert ours.estimate is not None and ours.estimate.num_samples > evaluated
+
+
+@pytest.mark.parametrize("density", [3.0, 12.0, 60.0])
+def test_the_estimate_of_equal_bins_sees_what_jumps_cost(density):
+    """A density that begins anywhere along a ray: nearly all errors are seen, and none is many times what is estimated."""
+    starts = torch.linspace(0.02, 0.18, 161)
+    rays = RayBundle(torch.tensor((-1.0, 0.0, 1.0)).repeat(161, 1), torch.eye(3)[:1].repeat(161, 1))
+    samples = coarse_samples(NARROW, OccupiedRays.of(NARROW, rays, 128), 24)
+    answer = FieldOutput(torch.zeros(161, 24, 3), density * (samples.s_vals > starts[:, None]))
+    passed = torch.exp(-(answer.densities * samples.s_edges.diff(dim=-1)).sum(-1))
+    estimated = error_of_equal_bins(PiecewiseConstant(), answer, samples, passed[:, None].expand(-1, 3), 1.0)
+    error = (passed - torch.exp(-density * (0.4 - starts))).abs()
+    assert float((estimated >= error).float().mean()) > 0.7
+    assert float((error / estimated).amax()) < 4.0
+    assert 1.0 < float(estimated.mean() / error.mean()) < 4.0
 
 
 def test_an_empty_picture_asks_nothing():

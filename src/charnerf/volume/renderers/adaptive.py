@@ -3,8 +3,12 @@
 Letters: R rays, K bins a ray, P points. For each ray: bins on the hull's segments; densities front to back
 until nothing behind can be seen; colours only of samples that count; an estimate of the error of every bin;
 bins with large errors cut into three, their samples kept, until the estimate is below the tolerance.
+
+These are many small operations, which cost as much of few rays as of many. Few rays take the culled renderer's samples, as many as
+the tolerance asks for, and those whose samples tell of a larger error take three times as many.
 """
 
+import math
 from dataclasses import dataclass
 from typing import final
 
@@ -23,12 +27,12 @@ from charnerf.types import (
     RenderOutput,
 )
 from charnerf.volume.compositing import expected_depth
-from charnerf.volume.marching import points_in_memory
+from charnerf.volume.marching import OccupiedRays, coarse_samples, points_in_memory
 from charnerf.volume.quadrature.base import AbstractQuadrature
 from charnerf.volume.renderers.base import WHITE, AbstractRenderer
 from charnerf.volume.renderers.culled import CulledRenderer
 from charnerf.volume.renderers.refinement import (
-    Marched,
+    error_of_equal_bins,
     heavy_weights,
     light_before,
     march,
@@ -42,6 +46,11 @@ UNSEEN_SHARE = 0.2  # of the tolerance: light that may be left behind an opaque 
 COLORLESS_SHARE = 0.15  # of the tolerance: light whose colour need not be evaluated
 NUM_SPLIT, MAX_ROUNDS = 6, 3  # bins cut a ray and round, and rounds
 RAYS_AT_ONCE = 4096
+FEW_RAYS = 512  # that take the culled renderer's samples
+USUAL_TOLERANCE = 0.05
+FEW_SAMPLES = 1.5  # times the culled renderer's at that tolerance: errors fall with their square
+MOST_SAMPLES = 4.0  # times that of any tolerance, before rays are refined
+MOST_TRIPLED = 2  # times that a ray's samples are tripled
 POINTS_A_STAGE = 2048  # front to back; fewer would save samples and cost calls
 LAST_STAGE = 4096  # points that are no longer worth a further stage
 
@@ -81,6 +90,16 @@ class AdaptiveRenderer(AbstractRenderer):
         )
         self.tolerance = tolerance
         self._culled = CulledRenderer(**self.settings)
+        looser = tolerance / USUAL_TOLERANCE
+        self._longest = (
+            SPACING * num_coarse * min(max(looser, 1.0), 2.0)
+        )  # m in the hull: more is worth bins of segments
+        samples = num_coarse * min(FEW_SAMPLES / math.sqrt(max(looser, 1e-6)), MOST_SAMPLES)
+        first = 3 * max(1, round(samples / 3.0))
+        self._tripling = [
+            CulledRenderer(**{**self.settings, "num_coarse": first * 3**times})
+            for times in range(MOST_TRIPLED + 1)
+        ]
 
     def render(self, scene: Scene, rays: RayBundle, generator: torch.Generator | None = None) -> Rendering:
         """Render rays (R,) to the tolerance; with a generator or gradients as the culled renderer."""
@@ -97,16 +116,20 @@ class AdaptiveRenderer(AbstractRenderer):
 
     def _render_block(self, scene: Scene, rays: RayBundle, near: Tensor, far: Tensor) -> "_Block":
         """Render some rays (R,) between near and far (R,), m."""
+        if len(near) <= FEW_RAYS:
+            seen = self.occupied(scene, rays)
+            if float(seen.length.mean()) <= self._longest:
+                return self._render_few(scene, seen)
         t_edges, occupied = _steps(scene.bounds, rays, near, far, self.hull_steps)
         along = OccupiedLength.of(t_edges, occupied)
         samples = Samples(scene, rays, self._chunk(scene.field))
         s_edges, begins = segment_bins(occupied, t_edges.diff(dim=-1), SPACING, MAX_BINS)
         widths, t_vals = s_edges.diff(dim=-1), along.t_vals(_middles(s_edges))
         bins = _Bins(begins, widths, t_vals, self._first_samples(samples, t_vals, widths))
-        block = _Block.empty(rays, far, samples)
+        block = _Block.empty(far)
         rows = torch.arange(len(near), device=near.device)
         for round_ in range(MAX_ROUNDS + 1):
-            done, errors = self._compose(block, rows, bins, last=round_ == MAX_ROUNDS)
+            done, errors = self._compose(block, samples, rows, bins, last=round_ == MAX_ROUNDS)
             left = (~done).nonzero()[:, 0]
             if len(left) == 0:
                 break
@@ -119,6 +142,24 @@ class AdaptiveRenderer(AbstractRenderer):
             widths, t_vals = s_edges.diff(dim=-1), along.t_vals(_middles(s_edges))
             wanted = (split.source < 0) & (widths > 0)
             bins = _Bins(begins, widths, t_vals, torch.where(wanted, samples.add(rows, t_vals, wanted), kept))
+        block.num_samples, block.num_colors = samples.num_evaluated, samples.num_colors
+        return block
+
+    def _render_few(self, scene: Scene, seen: OccupiedRays) -> "_Block":
+        """Render rays (R,) by the culled renderer's samples, three times as many where they do not do."""
+        block = _Block.empty(seen.far)
+        rows = (seen.length > 0).nonzero()[:, 0]
+        for renderer in self._tripling:
+            if len(rows) == 0:
+                break
+            some = seen.rows(rows)
+            placed = coarse_samples(scene.bounds, some, renderer.num_coarse)
+            answer, evaluated = renderer.evaluate(scene.field, placed)
+            output = self._composed(answer, placed, some.far)
+            estimated = error_of_equal_bins(self.quadrature, answer, placed, output.rgb, WHITE)
+            block.note(rows, output, estimated)
+            block.num_samples, block.num_colors = block.num_samples + evaluated, block.num_colors + evaluated
+            rows = rows[estimated > self.tolerance]
         return block
 
     def _first_samples(self, samples: Samples, t_vals: Tensor, widths: Tensor) -> Tensor:
@@ -140,20 +181,28 @@ class AdaptiveRenderer(AbstractRenderer):
             start = columns.stop
         return numbers
 
-    def _compose(self, block: "_Block", rows: Tensor, bins: "_Bins", *, last: bool) -> tuple[Tensor, Tensor]:
+    def _compose(
+        self, block: "_Block", samples: Samples, rows: Tensor, bins: "_Bins", *, last: bool
+    ) -> tuple[Tensor, Tensor]:
         """Composite rays by row, note those that are accurate enough, (r,) bool, and answer the errors of bins (r, K)."""
         numbers, widths = bins.numbers, bins.widths
-        densities = block.samples.densities(numbers)
+        densities = samples.densities(numbers)
         before, after = light_before(densities * widths)
         wanted = (numbers >= 0) & heavy_weights(before - after, COLORLESS_SHARE * self.tolerance)
-        rgb, colored = block.samples.colors(numbers, wanted)
+        rgb, colored = samples.colors(numbers, wanted)
         marched = march(densities, rgb, colored, widths, bins.begins, WHITE)
         stopped = ((numbers < 0) & (widths > 0)).any(-1)
         left = torch.where(stopped, after[:, -1], 0.0)
         estimated = marched.errors.square().sum(-1).sqrt() + marched.unseen + left
         done = (estimated <= self.tolerance) | last
         finished = done.nonzero()[:, 0]
-        block.note(rows[finished], marched, estimated, finished, bins.t_vals, stopped)
+        weights = marched.weights[finished]
+        output = RenderOutput(
+            rgb=marched.rgb[finished],
+            opacity=marched.opacity[finished],
+            depth=expected_depth(weights, bins.t_vals[finished], block.far[rows[finished]]),
+        )
+        block.note(rows[finished], output, estimated[finished], stopped[finished])
         return done, marched.errors
 
     def _gathered(self, blocks: list["_Block"], index: Tensor, rays: RayBundle) -> Rendering:
@@ -166,7 +215,7 @@ class AdaptiveRenderer(AbstractRenderer):
             join = lambda name: torch.cat([getattr(block, name) for block in blocks])  # noqa: E731
             rgb[index], opacity[index] = join("rgb"), join("opacity")
             depth[index], estimated[index] = join("depth"), join("estimated")
-        evaluated = sum(block.samples.num_evaluated for block in blocks)
+        evaluated = sum(block.num_samples for block in blocks)
         total = max(evaluated, num_rays * self.num_coarse)
         used = sum(int(block.used.sum()) for block in blocks)
         return Rendering(
@@ -179,7 +228,7 @@ class AdaptiveRenderer(AbstractRenderer):
                 tolerance=self.tolerance,
                 estimated=estimated,
                 num_samples=evaluated,
-                num_colors=sum(block.samples.num_colors for block in blocks),
+                num_colors=sum(block.num_colors for block in blocks),
                 num_stopped=sum(int(block.stopped.sum()) for block in blocks),
                 num_unresolved=int((estimated > self.tolerance).sum()),
             ),
@@ -230,7 +279,7 @@ class _Bins:
     numbers: Tensor
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Block:
     """Results of a block of rays, filled as rays are finished."""
 
@@ -241,28 +290,22 @@ class _Block:
     stopped: Tensor
     used: Tensor
     far: Tensor
-    samples: Samples
+    num_samples: int = 0
+    num_colors: int = 0
 
     @classmethod
-    def empty(cls, rays: RayBundle, far: Tensor, samples: Samples) -> "_Block":
-        """Rays that meet nothing."""
+    def empty(cls, far: Tensor) -> "_Block":
+        """Rays that meet nothing up to far (R,), m."""
         no = torch.zeros_like(far, dtype=torch.bool)
         zero = torch.zeros_like(far)
-        white = rays.origins.new_full((len(far), 3), WHITE)
-        return cls(white, zero, far.clone(), zero.clone(), no, no.clone(), far, samples)
+        white = far.new_full((len(far), 3), WHITE)
+        return cls(white, zero, far.clone(), zero.clone(), no, no.clone(), far)
 
     def note(
-        self,
-        rows: Tensor,
-        marched: Marched,
-        estimated: Tensor,
-        chosen: Tensor,
-        t_vals: Tensor,
-        stopped: Tensor,
+        self, rows: Tensor, output: RenderOutput, estimated: Tensor, stopped: Tensor | None = None
     ) -> None:
-        """Write the results of chosen rays (r,) into rows (r,)."""
-        weights = marched.weights[chosen]
-        self.rgb[rows], self.opacity[rows] = marched.rgb[chosen], marched.opacity[chosen]
-        self.estimated[rows], self.stopped[rows] = estimated[chosen], stopped[chosen]
-        self.depth[rows] = expected_depth(weights, t_vals[chosen], self.far[rows])
-        self.used[rows] = (weights > 0).any(-1)
+        """Write what rays (r,) see into rows (r,), its error, and whether what lies behind was left out."""
+        self.rgb[rows], self.opacity[rows], self.depth[rows] = output.rgb, output.opacity, output.depth
+        self.estimated[rows], self.used[rows] = estimated, output.opacity > 0
+        if stopped is not None:
+            self.stopped[rows] = stopped

@@ -27,7 +27,7 @@ class CulledRenderer(AbstractRenderer):
         seen = self.occupied(scene, rays)
         hit = (seen.length > 0).nonzero()[:, 0]
         num_rays, missed = len(seen.length), len(seen.length) - len(hit)
-        finest, coarse, left_out = self._two_passes(scene, seen[hit], generator, self._evaluate)
+        finest, coarse, left_out = self._two_passes(scene, seen[hit], generator, self.evaluate)
         a_ray = self.num_coarse + (0 if scene.fine is None else self.num_coarse + self.num_fine)
         return Rendering(
             finest=_spread(finest, hit, seen.far),
@@ -36,7 +36,7 @@ class CulledRenderer(AbstractRenderer):
             + LeftOut(rays=missed, rays_of=num_rays, samples=missed * a_ray, samples_of=missed * a_ray),
         )
 
-    def _evaluate(self, field: AbstractField, samples: RaySamples) -> tuple[FieldOutput, int]:
+    def evaluate(self, field: AbstractField, samples: RaySamples) -> tuple[FieldOutput, int]:
         """Pack the samples that count, evaluate them, and put them back among zeros, stage by stage."""
         inside, chunk = samples.inside, self._chunk(field)
         points, dirs = samples.points.reshape(-1, 3), samples.view_dirs.reshape(-1, 3)
