@@ -158,6 +158,14 @@ def test_color_that_compression_spreads_is_no_part_of_the_figure(tmp_path):
         assert found.sum() == pytest.approx(80 * (down - 99), rel=0.005), down
 
 
+def test_a_swatch_at_the_border_is_no_noise_of_the_paper(tmp_path):
+    """A pale figure stays whole beside something of nearly the paper's colour on the margin."""
+    picture = Image.new("RGB", (SIZE, SIZE), (214, 220, 228))
+    ImageDraw.Draw(picture).rectangle((150, 60, 250, 340), fill=(228, 232, 238))
+    ImageDraw.Draw(picture).rectangle((0, 100, 7, 140), fill=(232, 232, 226))
+    assert saved(tmp_path, picture).rgba[70:330, 160:240, 3].min() == 1.0
+
+
 def test_pale_clothes_stay_closed_in_a_jpeg(tmp_path):
     picture = Image.new("RGB", (SIZE, SIZE), (255, 255, 255))
     draw_figure(picture)

@@ -77,8 +77,11 @@ def find_background(drawing: Drawing) -> Background:
         inlier, paper = np.ones(int(ring.sum()), bool), checkers
         distance = np.linalg.norm(lab - paper, axis=-1)
         distance[_near_changes(checkers)] *= 0.25  # where cells meet, their colours may be mixed
-    noise = np.percentile(distance[ring][inlier], 99.0)
-    tolerance = float(np.clip(1.5 * noise, LEAST_TOLERANCE, MODE_TOLERANCE))
+    most, nearly_all = np.percentile(distance[ring][inlier], (95.0, 99.0))
+    noise = min(
+        2.0 * most, 1.5 * nearly_all
+    )  # a few pixels far off are text or a swatch, no noise of the paper
+    tolerance = float(np.clip(noise, LEAST_TOLERANCE, MODE_TOLERANCE))
     return Background(
         mask=_connected(
             _near(distance, lab - paper, tolerance, lossy=drawing.lossy),
