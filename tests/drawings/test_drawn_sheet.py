@@ -297,3 +297,12 @@ def test_a_profile_named_after_its_other_side_is_warned_of():
         return any("--side right" in line for line in read.warnings)
 
     assert warned("right") and not warned("side")
+
+
+def test_what_is_much_lower_than_the_figures_is_asked_about():
+    """A sword beside its owner, as tall as a figure may be that was drawn a little too small."""
+    pixels, _ = sheet(["front"], height=200, extras=False)
+    paper = np.full((pixels.shape[0], 160, 3), PAPER, np.uint8)
+    paper[130:290, 70:90] = paper[240:250, 50:110] = (110, 60, 40)
+    told = read_sheet(np.concatenate((pixels, paper), axis=1)).warnings
+    assert sum("is 80 % as tall as figure" in line for line in told) == 1

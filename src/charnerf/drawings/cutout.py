@@ -102,7 +102,8 @@ def _check_figure(figure: np.ndarray, name: str) -> None:
     if count > 1:
         raise DataError(
             f"{name}: found {count} figures side by side, expected one: it looks like a sheet. Give it alone, as"
-            " `charnerf reconstruct SHEET -o DIR`, or crop it to one figure."
+            " `charnerf reconstruct SHEET -o DIR`, or crop it to one figure. If it is one, its colours may be too near to the"
+            " background's: save it with a transparent background."
         )
     share = float(figure.mean())
     if share < 0.002:

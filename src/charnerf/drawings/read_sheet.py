@@ -21,6 +21,9 @@ from charnerf.pictures import bytes_on_white, to_bytes
 
 CANVAS = 96  # pixels a side of the canvases that views are named on
 ALIKE = 0.5  # overlap of the figures' colours below which they may be of two characters; of one it is 0.8 and more
+ALIKE_HEIGHT = (
+    0.83  # of the tallest figure's that another view has: more than one hand and one page differ by
+)
 PICTURE_SIDE = 1200  # pixels, at most
 FIGURE, ASIDE = (220, 40, 40), (150, 150, 150)
 
@@ -91,7 +94,10 @@ def read_sheet(
             *([] if order or figures else _between(views)),
             *_asides(sheet),
         ),
-        warnings=tuple(_warnings(drawing, canvases, chosen, doubtful, shown)),
+        warnings=(
+            *_warnings(drawing, canvases, chosen, doubtful, shown),
+            *_unlike_heights(drawing, sheet, chosen),
+        ),
         picture=_picture(drawing, sheet, views),
     )
 
@@ -201,6 +207,19 @@ def _warnings(
                 " out with `-` in --order if not."
             )
     return lines
+
+
+def _unlike_heights(drawing: Drawing, sheet: Sheet, chosen: Sequence[tuple[Viewpoint, int]]) -> list[str]:
+    """Figures much lower than the tallest one: a sword beside its owner, or a figure of which a part was not found."""
+    heights = {index: sheet.figures[index].box[3] - sheet.figures[index].box[1] for _, index in chosen}
+    tallest = max(heights, key=lambda index: heights[index])
+    return [
+        f"{drawing.name}: figure {index + 1} ({view.name}) is {100 * heights[index] / heights[tallest]:.0f} % as tall as figure"
+        f" {tallest + 1}, expected {100 * ALIKE_HEIGHT:.0f} % or more: is it a view of the character, and whole? If not, leave it"
+        " out with `-` in --order, or give the views one by one."
+        for view, index in chosen
+        if heights[index] < ALIKE_HEIGHT * heights[tallest]
+    ]
 
 
 def _histogram(canvas: np.ndarray) -> np.ndarray:

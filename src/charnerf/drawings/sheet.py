@@ -89,10 +89,11 @@ def find_figures(drawing: Drawing) -> Sheet:
     owners = _owners(regions, chosen, labels)
     order = _reading_order([regions[index].bbox for index in chosen])
     figures = []
-    for place in order:
+    for number, place in enumerate(order, start=1):
         index = chosen[place]
         mine = np.isin(labels, [regions[i].label for i, owner in owners.items() if owner == index])
-        figures.append(_crop(drawing, mine, ink | lines))
+        named = replace(drawing, name=f"{drawing.name}, figure {number}")
+        figures.append(_crop(named, mine, ink | lines))
     aside = [LeftAside(_box(regions[i].bbox), why) for i, why in reasons.items() if i not in owners]
     aside += [LeftAside(_box(one.bbox), "a line") for one in regionprops(label(lines, connectivity=2))]
     return Sheet(tuple(figures), tuple(aside))
