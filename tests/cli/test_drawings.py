@@ -71,6 +71,15 @@ def test_what_does_not_fit_is_said(files, arguments, message):
         given(files, **arguments)
 
 
+def test_views_that_are_no_two_are_refused_before_the_model_is_loaded(sheet, files):
+    with pytest.raises(DataError, match=r"front\.png: given for two views"):
+        given([files[0], files[0]])
+    with pytest.raises(DataError, match="view 45: found two drawings from this azimuth"):
+        given(files[:1], views=[f"45={files[1]}", f"45.5={files[2]}"])
+    with pytest.raises(DataError, match="drawings: found 1, expected at least two"):
+        given([sheet], order="front,-,-")
+
+
 def test_wrong_names_and_numbers_of_a_sheet(sheet, files):
     with pytest.raises(ConfigError, match="--figure: found 'two', expected a number"):
         given([sheet], figures=["back=two"])

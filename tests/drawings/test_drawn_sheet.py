@@ -256,6 +256,17 @@ def test_names_can_be_given():
         read_sheet(pixels, figures={"back": 5})
 
 
+def test_a_view_or_a_figure_given_twice_is_refused():
+    pixels, _ = sheet(["front", "back"], height=100, extras=False)
+    for given, message in (
+        ({"order": ["left", "90"]}, "--order: found left for two figures, expected each view once"),
+        ({"figures": {"back": 1, "180": 2}}, "--figure: found back for two figures"),
+        ({"figures": {"back": 1, "front": 1}}, "--figure front=1: found this figure given for back too"),
+    ):
+        with pytest.raises(DataError, match=message):
+            read_sheet(pixels, **given)
+
+
 def test_one_figure_is_no_sheet():
     pixels, _ = sheet(["front"])
     with pytest.raises(DataError, match="found one figure, expected a sheet with at least two views"):

@@ -94,6 +94,16 @@ class GivenDrawings:
     drawings: Mapping["Viewpoint", "Path | np.ndarray"]
     sheet: "np.ndarray | None" = None
 
+    def __post_init__(self) -> None:
+        """Check, before the model is loaded, that they are of views apart.
+
+        Raises:
+            DataError: If not.
+        """
+        from charnerf.drawings.viewpoints import check_viewpoints
+
+        check_viewpoints(self.drawings)
+
 
 def drawings_options(
     drawings: Files = None,

@@ -134,16 +134,35 @@ def _views(
         views |= {
             i: None if name == "-" else named_view(name, canvases[i], shown) for i, name in enumerate(order)
         }
+        _check_once("--order", [view for view in views.values() if view is not None])
     elif naming is not None:
         views |= dict(enumerate(square_views(naming.viewpoints)))
+    wanted: dict[int, Viewpoint] = {}
     for name, number in figures.items():
         if not 1 <= number <= count:
             raise DataError(f"--figure {name}={number}: found no such figure, expected 1 to {count}.")
+        if number - 1 in wanted:
+            raise DataError(
+                f"--figure {name}={number}: found this figure given for {wanted[number - 1].name} too, expected another one for"
+                " each view. Leave one out."
+            )
         shown = {view.name: canvases[i] for i, view in views.items() if view is not None}
-        wanted = named_view(name, canvases[number - 1], shown)
-        views |= {i: None for i, view in views.items() if view == wanted}
-        views[number - 1] = wanted
+        wanted[number - 1] = named_view(name, canvases[number - 1], shown)
+        views |= {i: None for i, view in views.items() if view == wanted[number - 1]} | {
+            number - 1: wanted[number - 1]
+        }
+    _check_once("--figure", list(wanted.values()))
     return views, naming is not None and naming.is_doubtful and not figures
+
+
+def _check_once(option: str, given: Sequence[Viewpoint]) -> None:
+    """Refuse a view that is given twice, under whatever names."""
+    for view in given:
+        if given.count(view) > 1:
+            raise DataError(
+                f"{option}: found {view.name} for two figures, expected each view once. Leave one of them out, or say where it is"
+                " seen from, such as 45 degrees."
+            )
 
 
 def square_views(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint | None]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.missing_side import missing_side
 from charnerf.drawings.options import ReadingOptions, Segment
 from charnerf.drawings.picture import draw_assumptions
-from charnerf.drawings.viewpoints import Viewpoint, is_turned
+from charnerf.drawings.viewpoints import NEAR, Viewpoint, check_viewpoints, is_turned
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
 from charnerf.geometry.framing import framing_cameras
@@ -29,7 +29,6 @@ from charnerf.types import SourceViews
 
 Picture = str | Path | np.ndarray
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
-NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ def read_views(
     """
     if size < 16:
         raise DataError(f"size: found {size}, expected at least 16 pixels.")
-    _check_viewpoints(drawings)
+    check_viewpoints(drawings)
     options = options or ReadingOptions()
     figures, inked = _figures(drawings, options)
     extent = half_extent([(figure.cutout.rgba[..., 3], figure.box) for figure in figures])
@@ -123,27 +122,6 @@ def _figures(
     figures = _without_gaps([_prepare(view, source, options.segment) for view, source in drawings.items()])
     figures, inked = (figures, ()) if options.keep_ink else _without_ink(figures)
     return _with_side(figures) if options.reconciled else figures, inked
-
-
-def _check_viewpoints(drawings: Mapping[Viewpoint, Picture]) -> None:
-    if len(drawings) < 2:
-        raise DataError(
-            f"drawings: found {len(drawings)}, expected at least two, such as front and side: from one drawing alone no depth"
-            " can be told."
-        )
-    azimuths = sorted(one.azimuth_deg for one in drawings)
-    for first, second in pairwise([*azimuths, azimuths[0] + 360.0]):
-        if second - first < NEAR:
-            raise DataError(
-                f"view {first:g}: found two drawings from this azimuth, expected one from each. Leave one out, or say where it"
-                " is seen from, such as 45 degrees."
-            )
-    files = [str(source) for source in drawings.values() if not isinstance(source, np.ndarray)]
-    for file in files:
-        if files.count(file) > 1:
-            raise DataError(
-                f"{file}: given for two views, expected another drawing for each. Leave one of the views out."
-            )
 
 
 def _canvases(figures: Sequence[DrawnFigure], extent: float, size: int) -> list[np.ndarray]:

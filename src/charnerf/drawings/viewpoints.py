@@ -1,8 +1,10 @@
 """From where a drawing shows its character: names that artists use, and angles."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
 from typing import TypeVar
 
 from charnerf.errors import DataError
@@ -23,6 +25,7 @@ AZIMUTHS = {
 
 FACING = 0.1  # sine of an azimuth below which a view is from the front or back
 SIDEWAYS = 0.9  # the same above which it is from a side, and bounds the depth
+NEAR = 1.0  # degrees: two drawings nearer to each other than this show one view
 HIGHEST = 80.0  # degrees of elevation: from straight above a figure has no floor line
 
 
@@ -135,6 +138,32 @@ def turnaround(front: Drawn, side: Drawn, back: Drawn, *, side_is: str = "left")
             f"side: found '{side_is}', expected 'left' or 'right': which side of the character is drawn."
         )
     return {viewpoint("front"): front, viewpoint(side_is): side, viewpoint("back"): back}
+
+
+def check_viewpoints(drawings: Mapping[Viewpoint, object]) -> None:
+    """Refuse drawings (files, or what is none) that are too few, or of which two show one view or are one file.
+
+    Raises:
+        DataError: With the view or the file.
+    """
+    if len(drawings) < 2:
+        raise DataError(
+            f"drawings: found {len(drawings)}, expected at least two, such as front and side: from one drawing alone no depth"
+            " can be told."
+        )
+    azimuths = sorted(one.azimuth_deg for one in drawings)
+    for first, second in pairwise([*azimuths, azimuths[0] + 360.0]):
+        if second - first < NEAR:
+            raise DataError(
+                f"view {first:g}: found two drawings from this azimuth, expected one from each. Leave one out, or say where it"
+                " is seen from, such as 45 degrees."
+            )
+    files = [str(source) for source in drawings.values() if isinstance(source, (str, Path))]
+    for file in files:
+        if files.count(file) > 1:
+            raise DataError(
+                f"{file}: given for two views, expected another drawing for each. Leave one of the views out."
+            )
 
 
 def _across(azimuth_deg: float) -> float:
