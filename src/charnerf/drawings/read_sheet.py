@@ -81,7 +81,6 @@ def read_sheet(
     canvases = canvases_to_name([one.drawing for one in sheet.figures])
     views, doubtful = _views(drawing, canvases, order, figures or {})
     chosen = [(view, index) for index, view in views.items() if view is not None]
-    shown = [view.name for view, _ in chosen]
     chosen.sort(key=lambda pair: pair[0].rank)
     return SheetViews(
         drawings={view: sheet.figures[index].drawing.rgba for view, index in chosen},
@@ -94,10 +93,7 @@ def read_sheet(
             *([] if order or figures else _between(views)),
             *_asides(sheet),
         ),
-        warnings=(
-            *_warnings(drawing, canvases, chosen, doubtful, shown),
-            *_unlike_heights(drawing, sheet, chosen),
-        ),
+        warnings=tuple(_warnings(drawing, sheet, canvases, chosen, doubtful)),
         picture=_picture(drawing, sheet, views),
     )
 
@@ -204,13 +200,15 @@ def _asides(sheet: Sheet) -> list[str]:
 
 def _warnings(
     drawing: Drawing,
+    sheet: Sheet,
     canvases: Sequence[np.ndarray],
     chosen: Sequence[tuple[Viewpoint, int]],
     doubtful: bool,
-    shown: Sequence[str],
 ) -> list[str]:
-    lines = []
+    lines = _unlike_heights(drawing, sheet, chosen)
     if doubtful:
+        names = {index: view.name for view, index in chosen}
+        shown = [names.get(index, "-") for index in range(len(sheet.figures))]
         lines.append(
             f"{drawing.name}: which view is which is doubtful. If it is not {','.join(shown)}, say so: --order"
             f" {','.join(reversed(shown))}, say, or --figure back=1."
