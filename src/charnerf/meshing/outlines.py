@@ -27,7 +27,8 @@ ABOVE = 1.1  # of the level: where the densest place of a ray is brought to; wha
 MOST = 30.0  # times; what would need more is no part of the figure that the field knows of
 SURE = 2.0  # of the level: a ray that is this dense on the coarse grid meets the surface and is not looked at again
 STEP = 0.012  # m, between samples
-RAYS_AT_ONCE = 512
+LIKELY = 4  # places of a ray that are looked at first
+RAYS_AT_ONCE = 2048
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityG
         camera, alpha = views.cameras[0, v : v + 1], views.images[0, v, 3]
         mask = alpha > MASK_ALPHA
         peaks = torch.full_like(alpha, torch.inf)
-        peaks[mask] = _peaks(scene, camera, mask, coarse, SURE * level)
+        peaks[mask] = _peaks(scene, camera, mask, coarse, level)
         gains = (ABOVE * level / peaks.clamp_min(torch.finfo(peaks.dtype).tiny)).clamp_min(1.0)
         missed = int((peaks < level).sum())
         # a gain of its own for every pixel would leave stairs: the largest around, smoothed
@@ -75,8 +76,11 @@ def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityG
     return raised
 
 
-def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sure: float) -> Tensor:
-    """Largest density inside the hull along the rays of a mask's pixels (H, W), 1/m; infinite where the grid reaches `sure`."""
+def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, level: float) -> Tensor:
+    """Largest density inside the hull along the rays of a mask's pixels (H, W), 1/m: where it is below what needs no gain.
+
+    Elsewhere it is infinite, or that of the places that the coarse grid thinks densest: most rays are settled by those.
+    """
     y, x = mask.nonzero().unbind(-1)
     rays = pixel_rays(camera[0], torch.stack((x + 0.5, y + 0.5), dim=-1).to(camera.focal.dtype))
     near, far = box_interval(rays, *scene.bounds.tight_box)
@@ -89,11 +93,15 @@ def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, sur
     for part in torch.arange(len(near), device=near.device).split(RAYS_AT_ONCE):
         t = near[part, None] + (far - near).clamp_min(0.0)[part, None] * share
         points = points_along(rays[part], t)
-        unsure = (coarse_density(points).amax(-1) < sure).nonzero()[:, 0]
-        dirs = rays.directions[part[unsure], None].expand(-1, num, -1)
-        points = points[unsure]
-        densities = densities_inside(scene.field, points, dirs, scene.bounds.may_hold(points))
-        peaks[part[unsure]] = densities.amax(-1)
+        expected = coarse_density(points)
+        left = (expected.amax(-1) < SURE * level).nonzero()[:, 0]
+        likely = expected[left].topk(min(LIKELY, num), dim=-1).indices
+        for places in (likely, torch.arange(num, device=near.device).expand(len(left), -1)):
+            asked = points[left].gather(1, places[: len(left), :, None].expand(-1, -1, 3))
+            dirs = rays.directions[part[left], None].expand_as(asked)
+            found = densities_inside(scene.field, asked, dirs, scene.bounds.may_hold(asked)).amax(-1)
+            peaks[part[left]] = found
+            left = left[found < ABOVE * level]
     return peaks
 
 
