@@ -27,7 +27,9 @@ LARGEST: Mapping[str, float] = {  # numbers by name, of whichever section
     **dict.fromkeys(("views", "eval_views", "times"), 100_000),
     **dict.fromkeys(("rays", "surface_points", "phase_rays", "phase_surface_points"), 10**7),
     **dict.fromkeys(("space_points", "num_points"), 10**7),
-    **dict.fromkeys(("train", "val", "test", "characters", "memory_mib", "cache_mib", "window"), 10**7),
+    **dict.fromkeys(
+        ("train", "train_characters", "val", "test", "characters", "memory_mib", "cache_mib", "window"), 10**7
+    ),
     **dict.fromkeys(("steps", "seconds", "window_steps"), 10**10),
 }
 LARGEST_OF_ALL = 2.0**63  # any number that has no bound of its own

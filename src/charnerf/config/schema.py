@@ -35,6 +35,7 @@ class Scale:
     phase_surface_points: list[CountOrZero]
     space_points: CountOrZero
     learning_rate: Annotated[float, Above(0)]
+    train_characters: Count
     batch_characters: Count
     steps: Count | None
     seconds: Annotated[float, Above(0)] | None
