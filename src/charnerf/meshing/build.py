@@ -13,6 +13,7 @@ from charnerf.meshing.extract import Extraction, extract_surface, fit_height, si
 from charnerf.meshing.field_colors import color_vertices
 from charnerf.meshing.grid_sampler import GridSampler
 from charnerf.meshing.level import LevelChoice, choose_level
+from charnerf.meshing.loose import tidied
 from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.outlines import gain_at, raised_rays
 from charnerf.meshing.smooth import smooth_mesh
@@ -29,6 +30,8 @@ class FoundSurface:
         extraction: The surface and what was removed from it.
         choice: The evidence for its level; None where the caller gave it.
         missed: Share of the drawings' pixels of the figure that this level met no surface at, until densities were raised there.
+        num_joined: Loose parts that were joined to the figure.
+        num_unneeded: Loose parts that were left out because no drawing needs them.
         left_out: Grid points not evaluated.
         seconds: Time it took.
     """
@@ -36,6 +39,8 @@ class FoundSurface:
     extraction: Extraction
     choice: LevelChoice | None
     missed: float
+    num_joined: int
+    num_unneeded: int
     left_out: LeftOut
     seconds: float
 
@@ -75,8 +80,8 @@ class BuiltMesh:
 
     @property
     def num_floaters(self) -> int:
-        """Parts dropped."""
-        return self.found.extraction.num_floaters
+        """Loose parts left out, of which no drawing needs `found.num_unneeded`."""
+        return self.found.num_unneeded + self.found.extraction.num_floaters
 
     @property
     def num_cavities(self) -> int:
@@ -143,11 +148,15 @@ def find_surface(
         raised = raised_rays(scene, views, level, coarse)
         if any(one.num_missed for one in raised):
             sampler.multiply(partial(gain_at, raised))
-    grid = sampler.evaluate_surface(level)
+    grid, num_joined, num_unneeded = sampler.evaluate_surface(level), 0, 0
+    if views is not None:
+        grid, num_joined, num_unneeded = tidied(sampler, grid, level, views)
     extraction = extract_surface(grid, level, density_at=sampler.density_at)
     extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, options.smooth))
     missed = sum(one.num_missed for one in raised) / max(1, sum(one.num_pixels for one in raised))
-    return FoundSurface(extraction, choice, missed, grid.left_out, time.perf_counter() - start)
+    return FoundSurface(
+        extraction, choice, missed, num_joined, num_unneeded, grid.left_out, time.perf_counter() - start
+    )
 
 
 def finish_mesh(

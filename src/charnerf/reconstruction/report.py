@@ -174,13 +174,15 @@ def mesh_words(built: BuiltMesh) -> str:
 def mesh_sentences(built: BuiltMesh) -> list[str]:
     """How a mesh came about."""
     share = built.left_out.shares()["grid_cells"] or 0.0
-    dropped = f"{counted(built.num_floaters, 'loose part')} and {counted(built.num_cavities, 'hidden cavity', 'hidden cavities')}"
+    parts = counted(built.num_floaters, "loose part")
+    cavities = counted(built.num_cavities, "hidden cavity", "hidden cavities")
     lines = [
         f"Surface where the density is {built.level:.3g} per metre; Euler number "
         f"{built.surface.euler_number}.",
         f"{100 * built.missed:.1f} % of the figure's pixels in the drawings met no surface; densities were raised there.",
         f"{100 * share:.1f} % of the grid's points were left out: outside the hull or away from the surface.",
-        f"{dropped} were dropped.",
+        f"{parts} and {cavities} were left out; of the parts no drawing needs {built.found.num_unneeded}.",
+        f"{counted(built.found.num_joined, 'loose part')} that drawings need were joined to the figure.",
         f"{built.num_extracted} faces before decimation.",
     ]
     if built.textured is not None:

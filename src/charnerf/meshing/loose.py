@@ -1,0 +1,195 @@
+"""Loose parts of a surface: joined to the figure where the field has matter between, or left out where no drawing needs them.
+
+A field that does not know at which depth an ear or a flail lies leaves islands in its haze. Drawings tell which of them are part of
+the figure: one that covers a pixel of the figure that nothing larger covers, to within a pixel. It is joined along the path through
+the field that is shortest and densest, as a hand is to its arm; where all is empty between it is drawn apart, and stays so. What is
+large, or near the figure and no speck, is joined too: of captured characters leaving it out cost 0.14 mm of Chamfer distance.
+
+Letters: X, Y, Z grid points along the axes; R rays, S samples on each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import torch
+from scipy import ndimage
+from skimage.graph import MCP
+from torch import Tensor
+from torch.nn import functional as F
+
+from charnerf.geometry.cameras import pixel_rays
+from charnerf.geometry.rays import box_interval, points_along
+from charnerf.meshing.density_grid import DensityGrid
+from charnerf.meshing.extract import KEPT_DISTANCE, KEPT_SHARE, KEPT_SPECK
+from charnerf.meshing.grid_sampler import GridSampler
+from charnerf.meshing.outlines import ABOVE, MASK_ALPHA, MOST
+from charnerf.types import Cameras, SourceViews
+
+REACH = 0.5  # m: of matter as dense as the level, the longest path that joins; of matter half as dense a path is half as long
+THICKNESS = 0.02  # m around a path that is raised with it
+EIGHT = np.ones((3, 3), bool)  # a pixel and those around it
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Connected parts of what is denser than a level.
+
+    Attributes:
+        labels: (X, Y, Z), 0 where the density is lower.
+        body: Label of the largest part.
+        needed: Labels of others that a drawing needs, or that are large or near, the largest first.
+        unneeded: Labels of the rest.
+    """
+
+    labels: np.ndarray
+    body: int
+    needed: tuple[int, ...]
+    unneeded: tuple[int, ...]
+
+
+def tidied(
+    sampler: GridSampler, grid: DensityGrid, level: float, views: SourceViews
+) -> tuple[DensityGrid, int, int]:
+    """Join loose parts to the figure, or leave them out.
+
+    Args:
+        sampler: Raised along the paths that join.
+        grid: What it evaluated for the level.
+        level: Density of the surface, 1/m.
+        views: The drawings (B = 1).
+
+    Returns:
+        The grid anew; how many parts were joined, and how many left out.
+    """
+    parts = find_parts(grid, level, views)
+    joined = join(sampler, parts, level)
+    if joined:
+        grid = sampler.evaluate_surface(level)
+        parts = find_parts(grid, level, views)
+    return without(grid, parts), joined, len(parts.unneeded)
+
+
+def find_parts(grid: DensityGrid, level: float, views: SourceViews) -> Parts:
+    """Tell the parts that drawings need from those that they do not.
+
+    Args:
+        grid: Densities.
+        level: Density of the surface, 1/m.
+        views: The drawings (B = 1); mirrored ones show nothing that was drawn.
+    """
+    labels, num = ndimage.label(grid.densities > level)
+    sizes = np.bincount(labels.reshape(-1), minlength=num + 1)[1:]
+    order = (np.argsort(-sizes, kind="stable") + 1).tolist()
+    if num <= 1:
+        return Parts(labels, 1, (), ())
+    body, others = order[0], order[1:]
+    solid = labels > 0
+    rim = np.asarray(solid & ~np.asarray(ndimage.binary_erosion(solid)))
+    areas = np.bincount(labels[rim], minlength=num + 1)[1:]
+    away = np.asarray(
+        ndimage.minimum(ndimage.distance_transform_edt(labels != body), labels, range(1, num + 1))
+    )
+    is_near = (away - 1.0) * grid.spacing <= KEPT_DISTANCE  # surfaces lie half a cell beyond grid points
+    least = np.where(is_near, KEPT_SPECK, KEPT_SHARE) * areas[body - 1]
+    found = {one for one in others if areas[one - 1] >= least[one - 1]}
+    for v in (views.present[0] & ~views.mirrored[0]).nonzero()[:, 0].tolist():
+        found |= _needed(
+            grid, labels, order, views.cameras[0, v], views.images[0, v, 3].cpu().numpy() > MASK_ALPHA
+        )
+    needed = tuple(one for one in others if one in found)
+    return Parts(labels, body, needed, tuple(one for one in others if one not in found))
+
+
+def _needed(
+    grid: DensityGrid, labels: np.ndarray, order: Sequence[int], camera: Cameras, mask: np.ndarray
+) -> set[int]:
+    """Labels, the largest first, that cover pixels of a mask (H, W) that no larger one covers to within a pixel."""
+    rows, columns = np.nonzero(mask)
+    met = _labels_along(grid, labels, camera.to("cpu", torch.float32), rows, columns)
+    missing, found = mask.copy(), set()
+    for label in order:
+        live = np.flatnonzero(missing[rows, columns])
+        covering = live[(met[live] == label).any(axis=1)]
+        if len(covering):
+            found.add(label)
+            seen = np.zeros_like(mask)
+            seen[rows[covering], columns[covering]] = True
+            missing &= ~ndimage.binary_dilation(seen, EIGHT)
+    return found
+
+
+def _labels_along(
+    grid: DensityGrid, labels: np.ndarray, camera: Cameras, rows: np.ndarray, columns: np.ndarray
+) -> np.ndarray:
+    """Labels of the grid points that pixels' rays pass, (R, S)."""
+    pixels = torch.from_numpy(np.stack((columns, rows), axis=-1) + 0.5).to(camera.focal.dtype)
+    rays = pixel_rays(camera, pixels)
+    corner = torch.from_numpy(grid.origin).float()
+    extent = (torch.tensor(labels.shape) - 1) * grid.spacing
+    near, far = box_interval(rays, corner, corner + extent)
+    num = 2 * max(labels.shape)  # samples lie less than a cell apart
+    share = (torch.arange(num) + 0.5) / num
+    points = points_along(rays, near[:, None] + (far - near).clamp_min(0.0)[:, None] * share)
+    index = ((points - corner) / grid.spacing).round().long().numpy()
+    inside = (index >= 0).all(-1) & (index < labels.shape).all(-1)
+    return np.where(inside, labels[tuple(np.moveaxis(np.where(inside[..., None], index, 0), -1, 0))], 0)
+
+
+def without(grid: DensityGrid, parts: Parts) -> DensityGrid:
+    """The grid without the parts that nobody needs."""
+    if not parts.unneeded:
+        return grid
+    return replace(
+        grid, densities=np.where(np.isin(parts.labels, parts.unneeded), np.float32(0.0), grid.densities)
+    )
+
+
+def join(sampler: GridSampler, parts: Parts, level: float) -> int:
+    """Raise the field along paths from the body to the parts that drawings need.
+
+    A path costs as many times its length as the level is of the density there, and nothing inside parts.
+
+    Args:
+        sampler: Its densities are raised.
+        parts: Of what it evaluated for the level.
+        level: Density of the surface, 1/m.
+
+    Returns:
+        How many parts were joined.
+    """
+    if not parts.needed:
+        return 0
+    body = np.argwhere(parts.labels == parts.body)[0]
+    with np.errstate(divide="ignore"):
+        costs = np.where(parts.labels > 0, 0.0, level / sampler.values.astype(np.float64))
+    search = MCP(
+        costs, fully_connected=False
+    )  # from face to face, as parts hang together; never through the empty
+    ends = [tuple(np.argwhere(parts.labels == one)[0]) for one in parts.needed]
+    total, _ = search.find_costs([tuple(body)], ends)
+    reached = [end for end in ends if total[end] <= REACH / sampler.spacing]
+    path = np.zeros(sampler.shape, bool)
+    for end in reached:
+        path[tuple(np.transpose(search.traceback(end)))] = True
+    raised = ndimage.binary_dilation(
+        path & (parts.labels == 0), iterations=max(1, round(THICKNESS / sampler.spacing))
+    )
+    raised &= sampler.inside
+    sampler.evaluate(raised)
+    needed = ABOVE * level / np.maximum(sampler.values[raised], np.finfo(np.float32).tiny)
+    gains = np.zeros(sampler.shape, np.float32)
+    gains[raised] = np.log(np.clip(needed, 1.0, MOST))
+    sampler.multiply(partial(_gain_at, torch.from_numpy(gains), sampler.origin, sampler.spacing))
+    return len(reached)
+
+
+def _gain_at(logs: Tensor, origin: np.ndarray, spacing: float, points: Tensor) -> Tensor:
+    """Gains (P,) at points (P, 3), m, between those of grid points, whose logarithms (X, Y, Z) are given; 1 beyond."""
+    extent = (torch.tensor(logs.shape) - 1).to(points) * spacing
+    at = 2.0 * (points - points.new_tensor(origin)) / extent - 1.0
+    read = F.grid_sample(logs[None, None].to(points), at.flip(-1)[None, None, None], align_corners=True)
+    return read.reshape(-1).exp()
