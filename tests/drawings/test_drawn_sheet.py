@@ -136,6 +136,16 @@ def test_a_hand_beyond_a_cuff_of_the_papers_colour_is_the_figures():
     assert [one.reason for one in found.left_aside if one.box[3] > 122] == ["a swatch or a panel"] * 2
 
 
+def test_a_figure_that_a_beard_of_the_papers_colour_takes_apart_is_one():
+    page = np.full((300, 600, 3), 255, np.uint8)
+    for left in (100, 300, 500):
+        page[60:240, left : left + 60] = (60, 90, 160)
+        page[60:200, left + 40 : left + 60] = 255  # so that none is a panel
+    page[130:134, 300:360] = 255
+    found = find_figures(drawing_from_array(page, "sheet"))
+    assert [one.box for one in found.figures] == [(left, 60, left + 60, 240) for left in (100, 300, 500)]
+
+
 def test_two_rows_are_read_row_by_row():
     pixels, boxes = sheet(["front", "side", "back", "right"], rows=2)
     found = find_figures(drawing_from_array(pixels, "sheet"))

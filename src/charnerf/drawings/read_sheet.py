@@ -75,8 +75,8 @@ def read_sheet(
     count = len(sheet.figures)
     if count < 2:
         raise DataError(
-            f"{drawing.name}: found one figure, expected a sheet with at least two views. Give views one by one: FRONT SIDE"
-            " BACK, or --view 0=FRONT --view 90=SIDE."
+            f"{drawing.name}: found {'one' if count else 'no'} figure, expected a sheet with at least two views. Give views one by"
+            " one: FRONT SIDE BACK, or --view 0=FRONT --view 90=SIDE."
         )
     canvases = canvases_to_name([one.drawing for one in sheet.figures])
     views, doubtful = _views(drawing, canvases, order, figures or {})

@@ -3,7 +3,7 @@
 Letters: H, W of the sheet.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -81,12 +81,14 @@ def find_figures(drawing: Drawing) -> Sheet:
             f"{drawing.name}: found nothing on its background, expected figures of a character. Check the file."
         )
     chosen, reasons = _without_cut_off(regions, *_choose(regions), ink.shape)
+    groups = _groups(regions, chosen, labels)
+    chosen += _in_pieces(regions, chosen, groups, ink.shape)
     if len(chosen) > MOST_FIGURES:
         raise DataError(
             f"{drawing.name}: found {len(chosen)} figures, expected at most {MOST_FIGURES}: crop it to the views of one"
             " character, or give them one by one with --view."
         )
-    owners = _owners(regions, chosen, labels)
+    owners = _owners(regions, chosen, groups)
     order = _reading_order([regions[index].bbox for index in chosen])
     figures = []
     for number, place in enumerate(order, start=1):
@@ -190,23 +192,41 @@ def _without_cut_off(
     return [i for i in chosen if i not in cut], reasons | dict.fromkeys(cut, "cut off by the border")
 
 
-def _owners(regions: Sequence[Any], chosen: Sequence[int], labels: np.ndarray) -> dict[int, int]:
-    """Which figure each region belongs to.
-
-    Small loose parts within a figure's box are the figure's, and so is what lies next to it, or next to that: bones beyond bones.
-    Specks are nobody's.
-    """
+def _groups(regions: Sequence[Any], chosen: Sequence[int], labels: np.ndarray) -> dict[int, int]:
+    """Number of the group of each region that is no speck: what is next to each other, or next to that, is one group."""
     least = SPECK_SHARE * min((regions[index].area for index in chosen), default=0.0)
     parts = [index for index, one in enumerate(regions) if one.area >= least]
     drawn = np.isin(labels, [regions[index].label for index in parts])
     groups = label(ndimage.distance_transform_edt(~drawn) <= 0.5 * BESIDE * max(labels.shape), connectivity=2)
-    group_of = {index: groups[tuple(regions[index].coords[0])] for index in parts}
+    return {index: int(groups[tuple(regions[index].coords[0])]) for index in parts}
+
+
+def _in_pieces(
+    regions: Sequence[Any], chosen: Sequence[int], groups: Mapping[int, int], shape: tuple[int, ...]
+) -> list[int]:
+    """The largest pieces of figures that fell apart, as at a beard of the paper's colour: whole groups as tall as the chosen."""
+    if not chosen:
+        return []
+    usual = float(np.median([regions[index].bbox[2] - regions[index].bbox[0] for index in chosen]))
+    found = []
+    for group in sorted(set(groups.values()) - {groups[index] for index in chosen}):
+        members = [index for index, number in groups.items() if number == group]
+        boxes = np.array([regions[index].bbox for index in members])
+        (top, left), (down, right) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+        is_whole = top and left and down < shape[0] and right < shape[1]
+        if len(members) > 1 and is_whole and abs(down - top - usual) <= ALIKE * usual:
+            found.append(max(members, key=lambda index: regions[index].area))
+    return found
+
+
+def _owners(regions: Sequence[Any], chosen: Sequence[int], groups: Mapping[int, int]) -> dict[int, int]:
+    """Which figure each region belongs to, but for specks: small loose parts within a figure's box are its, and so is its group."""
     owners = {index: index for index in chosen}
-    for index in parts:
+    for index, group in groups.items():
         row, column = regions[index].centroid
         boxes = {figure: regions[figure].bbox for figure in chosen}
         within = [i for i, box in boxes.items() if box[0] <= row <= box[2] and box[1] <= column <= box[3]]
-        near = within or [i for i in chosen if group_of[i] == group_of[index]]
+        near = within or [i for i in chosen if groups[i] == group]
         if near:
             nearest = min(near, key=lambda i: _apart(boxes[i], regions[index].bbox))
             owners.setdefault(index, nearest)
