@@ -90,8 +90,8 @@ def read_bags(rows: Tensor, indices: Tensor, weights: Tensor) -> Tensor:
 def _residual(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """The block's result, and what its gradient reads: both layers' inputs."""
     rectified = x.relu()
-    hidden = torch.addmm(b1, rectified, w1.t()).relu_()
-    return torch.add(x, b2).addmm_(hidden, w2.t()), rectified, hidden
+    hidden = (rectified @ w1.t()).add_(b1).relu_()
+    return (hidden @ w2.t()).add_(x).add_(b2), rectified, hidden
 
 
 def _score(x: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> tuple[Tensor, Tensor]:
