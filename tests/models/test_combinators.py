@@ -47,6 +47,16 @@ def test_the_order_of_views_does_not_matter(name, num_views):
     )
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_projected_once_answers_every_direction(name):
+    features, dirs, sources, valid = inputs(3)
+    combine = make(name)
+    projected = combine.project(features)
+    for towards in (dirs, -dirs, torch.zeros_like(dirs[:1])):
+        found = combine.answer(features, projected, towards, sources, valid)
+        torch.testing.assert_close(found, combine(features, towards, sources, valid), atol=1e-12, rtol=0)
+
+
 @pytest.mark.parametrize("name", ["sa", "view_mha", "learned"])
 def test_shares_of_views_are_those_of_what_is_combined(name):
     """They sum to one, and hidden views get none."""

@@ -74,9 +74,10 @@ class Field(nn.Module):
     def fuse(self, view_features: Tensor, views: PointViews, view_dirs: Tensor) -> TrunkOutput:
         """What H and f2 make of V^(i) (P, V, D)."""
         dirs = _seen(view_dirs, self.density.combinator_sees_directions)
-        fused = self.combinator(view_features, dirs, views.dirs, views.valid)
+        projected = self.combinator.project(view_features)
+        fused = self.combinator.answer(view_features, projected, dirs, views.dirs, views.valid)
         features, raw = self.multi_view(fused, _seen(view_dirs, self.density.f2_sees_directions))
-        return TrunkOutput(raw_densities=raw, features=features, view_features=view_features)
+        return TrunkOutput(raw, features, view_features, projected)
 
     def densities(self, trunk: TrunkOutput, kept: Tensor) -> Tensor:
         """Densities (P,), 1/m, of which the drawings leave a share `kept` (P,), all where it is above 1."""

@@ -24,16 +24,15 @@ def residual_rows(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> 
     return _Residual.apply(x, w1, b1, w2, b2)  # type: ignore[no-any-return, no-untyped-call]
 
 
-def score_views(features: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
-    """`relu(x W' + addend) w' + b_score` of features x (P, V, D): a score each, (P, V); addends broadcast to (P, V, H)."""
-    if torch.is_autocast_enabled(features.device.type):
-        return F.linear((F.linear(features, w) + addend).relu(), w_score, b_score)[..., 0]
+def score_views(projected: Tensor, addend: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
+    """`relu(x + addend) w' + b_score` of projected features x (P, V, H): a score each, (P, V); addends broadcast to x."""
+    if torch.is_autocast_enabled(projected.device.type):
+        return F.linear((projected + addend).relu(), w_score, b_score)[..., 0]
     if not torch.is_grad_enabled():
-        return _score(features, addend, w, w_score, b_score)[0]
-    rows = features.reshape(-1, features.shape[-1])
-    addends = addend.expand(*features.shape[:-1], -1).reshape(-1, addend.shape[-1])
-    scores: Tensor = _Score.apply(rows, addends, w, w_score, b_score)  # type: ignore[no-untyped-call]
-    return scores.view(features.shape[:-1])
+        return _score(projected, addend, w_score, b_score)[0]
+    rows, addends = (one.expand_as(projected).reshape(-1, projected.shape[-1]) for one in (projected, addend))
+    scores: Tensor = _Score.apply(rows, addends, w_score, b_score)  # type: ignore[no-untyped-call]
+    return scores.view(projected.shape[:-1])
 
 
 def linear_of_columns(features: Tensor, w: Tensor) -> Tensor:
@@ -94,12 +93,10 @@ def _residual(x: Tensor, w1: Tensor, b1: Tensor, w2: Tensor, b2: Tensor) -> tupl
     return (hidden @ w2.t()).add_(x).add_(b2), rectified, hidden
 
 
-def _score(x: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> tuple[Tensor, Tensor]:
-    """The scores (...) of x (..., D), and the rows that they are made of."""
-    leading = x.shape[:-1]
-    rows = x.reshape(-1, x.shape[-1]) @ w.t()
-    rows.view(*leading, len(w)).add_(addend).relu_()
-    return torch.addmm(b_score, rows, w_score.t()).view(leading), rows
+def _score(x: Tensor, addend: Tensor, w_score: Tensor, b_score: Tensor) -> tuple[Tensor, Tensor]:
+    """The scores (...) of x (..., H), and the rows that they are made of."""
+    rows = (x + addend).relu_().reshape(-1, x.shape[-1])
+    return torch.addmm(b_score, rows, w_score.t()).view(x.shape[:-1]), rows
 
 
 def _sum_views(weights: Tensor, features: Tensor) -> Tensor:
@@ -137,18 +134,18 @@ class _Residual(torch.autograd.Function):
 
 class _Score(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, x: Tensor, addend: Tensor, w: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
-        scores, hidden = _score(x, addend, w, w_score, b_score)
-        ctx.save_for_backward(x, hidden, w, w_score)
+    def forward(ctx: Any, x: Tensor, addend: Tensor, w_score: Tensor, b_score: Tensor) -> Tensor:
+        scores, hidden = _score(x, addend, w_score, b_score)
+        ctx.save_for_backward(hidden, w_score)
         return scores
 
     @staticmethod
     @once_differentiable  # type: ignore[no-untyped-call, untyped-decorator]
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, ...]:
-        x, hidden, w, w_score = ctx.saved_tensors
+        hidden, w_score = ctx.saved_tensors
         column = grad[:, None]
         inner = _where_positive_(column * w_score, hidden)
-        return inner @ w, inner, inner.t() @ x, column.t() @ hidden, grad.sum(0, keepdim=True)
+        return inner, inner, column.t() @ hidden, grad.sum(0, keepdim=True)
 
 
 class _SumViews(torch.autograd.Function):

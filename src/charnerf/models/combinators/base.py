@@ -30,6 +30,17 @@ class AbstractCombinator(nn.Module, ABC):
             V_multi, (P, D).
         """
 
+    def project(self, view_features: Tensor) -> Tensor:
+        """What answers to all directions are made of, (P, V, C), beside V^(i) (P, V, D) themselves: asked once; nothing here."""
+        return view_features[..., :0]
+
+    def answer(
+        self, view_features: Tensor, projected: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
+    ) -> Tensor:
+        """What `forward` gives, by what `project` gave (P, V, C)."""
+        fused: Tensor = self(view_features, view_dirs, source_dirs, valid)
+        return fused
+
 
 class AbstractWeighing(AbstractCombinator):
     """A combinator that decides by the point what each view counts for."""

@@ -30,16 +30,27 @@ class LearnedWeights(AbstractWeighing):
 
     def forward(self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
         """Fuse (P, V, D) to (P, D)."""
-        return sum_views(self.view_shares(view_features, view_dirs, source_dirs, valid), view_features)
+        return self.answer(view_features, self.project(view_features), view_dirs, source_dirs, valid)
+
+    def project(self, view_features: Tensor) -> Tensor:
+        """The features' part of the scoring network, (P, V, hidden)."""
+        return F.linear(view_features, self.from_features.weight)
+
+    def answer(
+        self, view_features: Tensor, projected: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
+    ) -> Tensor:
+        """The mean of (P, V, D) by the shares."""
+        return sum_views(self._shares(projected, view_dirs, source_dirs, valid), view_features)
 
     def view_shares(
         self, view_features: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
     ) -> Tensor:
         """Weights (P, V) by which the views are averaged."""
+        return self._shares(self.project(view_features), view_dirs, source_dirs, valid)
+
+    def _shares(self, projected: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor) -> Tensor:
         sources, weight = once(source_dirs), self.from_angles.weight
         cosines = view_cosines(once(view_dirs), sources)
         angles = F.linear(sources, weight[:, 1:], self.from_features.bias) + cosines[..., None] * weight[:, 0]
-        logits = score_views(
-            view_features, angles, self.from_features.weight, self.score.weight, self.score.bias
-        )
+        logits = score_views(projected, angles, self.score.weight, self.score.bias)
         return softmax_views(masked_logits(logits, valid))

@@ -11,11 +11,12 @@ from charnerf.types import TensorRecord
 
 @dataclass(frozen=True)
 class TrunkOutput(TensorRecord):
-    """raw densities (P,), features for the colour head (P, D) and per-view features (P, V, D)."""
+    """raw densities (P,), features for the colour head (P, D), features by view (P, V, D), H's projections of those (P, V, C)."""
 
     raw_densities: Tensor
     features: Tensor
     view_features: Tensor
+    projected: Tensor
 
 
 class AbstractDensity(nn.Module):

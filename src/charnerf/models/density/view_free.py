@@ -35,5 +35,7 @@ class ViewFreeDensity(AbstractDensity):
         """The trunk's features, the direction, and what the combinator answers to it, through the colour block."""
         directed = trunk.features + self.from_dirs(encode_directions(once(view_dirs)))
         if combinator.sees_query:
-            directed = directed + combinator(trunk.view_features, view_dirs, views.dirs, views.valid)
+            directed = directed + combinator.answer(
+                trunk.view_features, trunk.projected, view_dirs, views.dirs, views.valid
+            )
         return self.color(directed)

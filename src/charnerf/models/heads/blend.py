@@ -40,9 +40,8 @@ class BlendHead(AbstractHead):
         readings = torch.cat((torch.stack((cosines, visibility), dim=-1), views.rgb), dim=-1)
         of_all = F.linear(features, self.from_features.weight, self.from_views.bias)
         scores = score_views(
-            view_features,
+            F.linear(view_features, self.from_views.weight),
             self.from_readings(readings) + of_all[:, None],
-            self.from_views.weight,
             self.score.weight,
             self.score.bias,
         )
