@@ -48,10 +48,8 @@ FIGURES = {
     "haze": "haze",
     "chamfer_mm": "Chamfer mm",
 }
-OF_DRAWINGS = {
-    "psnr": "drawings dB",
-    "silhouette_iou": "drawings IoU",
-}  # themselves, from where they were drawn
+# themselves, from where they were drawn
+OF_DRAWINGS = {"psnr": "drawings dB", "silhouette_iou": "drawings IoU"}
 DECIMALS = {"silhouette_iou": 3, "haze": 3, "chamfer_mm": 1}
 
 

@@ -105,11 +105,8 @@ def test_an_antenna_ends_in_its_figure_and_an_axis_goes_through_it():
     page = np.full((300, 600, 3), 255, np.uint8)
     for left in (100, 300):
         page[100:250, left : left + 60] = (60, 90, 160)
-        page[60:100, left + 10 : left + 13] = (
-            60,
-            90,
-            160,
-        )  # with the trunk below it longer than a line is at least
+        # with the trunk below it longer than a line is at least
+        page[60:100, left + 10 : left + 13] = (60, 90, 160)
     page[40:270, 330:332] = (150, 150, 200)
     found = find_figures(drawing_from_array(page, "sheet"))
     assert [one.box for one in found.figures] == [(100, 60, 160, 250), (300, 60, 360, 250)]
@@ -124,11 +121,8 @@ def test_a_hand_beyond_a_cuff_of_the_papers_colour_is_the_figures():
     for left in (100, 600):
         page[60:240, left : left + 60] = page[120:135, left : left + 120] = (60, 90, 160)
         page[120:135, left + 125 : left + 150] = (200, 140, 110)  # a hand, past the box, 5 pixels on
-        page[120:135, left + 155 : left + 160] = (
-            60,
-            90,
-            160,
-        )  # what it holds, beyond a ring of the paper's colour
+        # what it holds, beyond a ring of the paper's colour
+        page[120:135, left + 155 : left + 160] = (60, 90, 160)
         page[120:122, left + 165 : left + 167] = (200, 140, 110)  # a speck
         page[120:135, left + 200 : left + 225] = (200, 140, 110)  # a detail
     found = find_figures(drawing_from_array(page, "sheet"))

@@ -78,9 +78,8 @@ def find_background(drawing: Drawing) -> Background:
         distance = np.linalg.norm(lab - paper, axis=-1)
         distance[_near_changes(checkers)] *= 0.25  # where cells meet, their colours may be mixed
     most, nearly_all = np.percentile(distance[ring][inlier], (95.0, 99.0))
-    noise = min(
-        2.0 * most, 1.5 * nearly_all
-    )  # a few pixels far off are text or a swatch, no noise of the paper
+    # a few pixels far off are text or a swatch, no noise of the paper
+    noise = min(2.0 * most, 1.5 * nearly_all)
     tolerance = float(np.clip(noise, LEAST_TOLERANCE, MODE_TOLERANCE))
     return Background(
         mask=_connected(

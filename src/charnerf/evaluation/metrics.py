@@ -151,9 +151,8 @@ def ssim(prediction: Tensor, truth: Tensor) -> float:
     Source: Wang 2004; as torchmetrics, whose import takes longer than all pictures of a character.
     """
     check_pair(prediction, truth)
-    kept = around_figures(
-        prediction, truth, WINDOW_RADIUS + 1
-    )  # beyond edges a picture is continued mirrored
+    # beyond edges a picture is continued mirrored
+    kept = around_figures(prediction, truth, WINDOW_RADIUS + 1)
     # in float32 the difference of squares alone would be off by 1e-5
     x, y = (picture[kept].double().movedim(-1, 0) for picture in (prediction, truth))
     mean_x, mean_y, square_x, square_y, product = window_means(torch.stack((x, y, x * x, y * y, x * y)))

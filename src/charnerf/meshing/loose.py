@@ -166,9 +166,8 @@ def join(sampler: GridSampler, parts: Parts, level: float) -> int:
     body = np.argwhere(parts.labels == parts.body)[0]
     with np.errstate(divide="ignore"):
         costs = np.where(parts.labels > 0, 0.0, level / sampler.values.astype(np.float64))
-    search = MCP(
-        costs, fully_connected=False
-    )  # from face to face, as parts hang together; never through the empty
+    # from face to face, as parts hang together; never through the empty
+    search = MCP(costs, fully_connected=False)
     ends = [tuple(np.argwhere(parts.labels == one)[0]) for one in parts.needed]
     total, _ = search.find_costs([tuple(body)], ends)
     reached = [end for end in ends if total[end] <= REACH / sampler.spacing]

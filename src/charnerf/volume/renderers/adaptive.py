@@ -91,9 +91,8 @@ class AdaptiveRenderer(AbstractRenderer):
         self.tolerance = tolerance
         self._culled = CulledRenderer(**self.settings)
         looser = tolerance / USUAL_TOLERANCE
-        self._longest = (
-            SPACING * num_coarse * min(max(looser, 1.0), 2.0)
-        )  # m in the hull: more is worth bins of segments
+        # m in the hull: more is worth bins of segments
+        self._longest = SPACING * num_coarse * min(max(looser, 1.0), 2.0)
         samples = num_coarse * min(FEW_SAMPLES / math.sqrt(max(looser, 1e-6)), MOST_SAMPLES)
         first = 3 * max(1, round(samples / 3.0))
         self._tripling = [

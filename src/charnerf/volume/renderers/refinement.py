@@ -19,9 +19,8 @@ from charnerf.volume.quadrature.base import AbstractQuadrature
 
 DENSITY_SHARE = 0.3  # of the jump to a neighbour's density, taken as the error of a bin's mean density
 THIRDS_SHARE = 0.25  # of what every third of equal bins differs by, taken as the error of all of them
-BOUND_SHARE = (
-    1.0 / 3.0
-)  # of the bound of equal bins, which is several times what fields read from drawings make
+# of the bound of equal bins, which is several times what fields read from drawings make
+BOUND_SHARE = 1.0 / 3.0
 COLOR_SHARE = 0.2  # of the difference to a neighbour's colour, taken as the error of a bin's colour
 
 
