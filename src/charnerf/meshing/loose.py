@@ -30,6 +30,7 @@ from charnerf.meshing.outlines import ABOVE, MASK_ALPHA, MOST
 from charnerf.types import Cameras, SourceViews
 
 REACH = 0.5  # m: of matter as dense as the level, the longest path that joins; of matter half as dense a path is half as long
+ROUNDS = 2  # the first goes by values that are interpolated away from the surface, and may lay parts bare
 THICKNESS = 0.02  # m around a path that is raised with it
 EIGHT = np.ones((3, 3), bool)  # a pixel and those around it
 
@@ -65,9 +66,12 @@ def tidied(
     Returns:
         The grid anew; how many parts were joined, and how many left out.
     """
-    parts = find_parts(grid, level, views)
-    joined = join(sampler, parts, level)
-    if joined:
+    parts, joined = find_parts(grid, level, views), 0
+    for _ in range(ROUNDS):
+        found = join(sampler, parts, level)
+        if found == 0:
+            break
+        joined += found
         grid = sampler.evaluate_surface(level)
         parts = find_parts(grid, level, views)
     return without(grid, parts), joined, len(parts.unneeded)
@@ -134,9 +138,11 @@ def _labels_along(
     num = 2 * max(labels.shape)  # samples lie less than a cell apart
     share = (torch.arange(num) + 0.5) / num
     points = points_along(rays, near[:, None] + (far - near).clamp_min(0.0)[:, None] * share)
-    index = ((points - corner) / grid.spacing).round().long().numpy()
-    inside = (index >= 0).all(-1) & (index < labels.shape).all(-1)
-    return np.where(inside, labels[tuple(np.moveaxis(np.where(inside[..., None], index, 0), -1, 0))], 0)
+    last = np.array(labels.shape) - 1
+    index = (
+        ((points - corner) / grid.spacing).round().long().numpy().clip(0, last)
+    )  # the outermost layer is empty
+    return np.asarray(labels[tuple(np.moveaxis(index, -1, 0))])
 
 
 def without(grid: DensityGrid, parts: Parts) -> DensityGrid:
