@@ -205,9 +205,8 @@ def test_what_lies_beside_the_outlines_is_not_asked(person_views):
         "hull_steps": 96,
         "memory_mib": 256.0,
     }
-    camera = helpers.target_cameras(3, size=48)[
-        1
-    ]  # more rays than few: with outlines these take another number of samples
+    # more rays than few, which take as many samples as their hull is wide
+    camera = helpers.target_cameras(3, size=48)[1]
     for renderer in (CulledRenderer(**settings), AdaptiveRenderer(**settings, tolerance=0.01)):
         found = renderer.render_camera(scene, camera)
         asked = renderer.render_camera(replace(scene, bounds=replace(scene.bounds, outlines=None)), camera)
