@@ -199,8 +199,16 @@ def _given(
 def _recorded(combinator: AbstractCombinator) -> Iterator[list[_Inputs]]:
     """Collect a combinator's inputs while the context lasts."""
     calls: list[_Inputs] = []
-    handle = combinator.register_forward_pre_hook(lambda _, inputs: calls.append(_Inputs(*inputs)))
+    answer = combinator.answer
+
+    def recorded(
+        view_features: Tensor, projected: Tensor, view_dirs: Tensor, source_dirs: Tensor, valid: Tensor
+    ) -> Tensor:
+        calls.append(_Inputs(view_features, view_dirs, source_dirs, valid))
+        return answer(view_features, projected, view_dirs, source_dirs, valid)
+
+    combinator.answer = recorded  # type: ignore[method-assign]
     try:
         yield calls
     finally:
-        handle.remove()
+        del combinator.answer
