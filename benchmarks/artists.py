@@ -78,8 +78,9 @@ def measured(model: Model, folder: Path, *, side_is: str) -> tuple[dict[str, obj
         "left out": built.num_floaters,
         "seconds": f"{seconds:.1f}",
     }
-    shown = Image.fromarray(to_bytes(np.concatenate([on_white(one) for one in turntable], axis=1)))
-    return row, _stacked(contact_sheet(built.mesh, hero.turnaround.detailed), shown)
+    shown = to_bytes(np.concatenate([on_white(one) for one in turntable], axis=1))
+    sheet = np.asarray(contact_sheet(built.mesh, hero.turnaround.detailed))  # as wide as the turntable
+    return row, Image.fromarray(np.concatenate((sheet, shown)))
 
 
 def _seen(hero: Hero, view: Viewpoint) -> RenderOutput:
@@ -117,16 +118,6 @@ def _iou(seen: RenderOutput, mask: Tensor) -> float:
 def _text(values: Sequence[float], decimals: int) -> str:
     """Their mean; a dash where there are none."""
     return f"{fmean(values):.{decimals}f}" if values else "-"
-
-
-def _stacked(*pictures: Image.Image) -> Image.Image:
-    """Pictures of one width above each other."""
-    stack = Image.new("RGB", (pictures[0].width, sum(one.height for one in pictures)), "white")
-    top = 0
-    for one in pictures:
-        stack.paste(one, (0, top))
-        top += one.height
-    return stack
 
 
 def main() -> None:

@@ -21,9 +21,7 @@ from charnerf.pictures import bytes_on_white, to_bytes
 
 CANVAS = 96  # pixels a side of the canvases that views are named on
 ALIKE = 0.5  # overlap of the figures' colours below which they may be of two characters; of one it is 0.8 and more
-ALIKE_HEIGHT = (
-    0.83  # of the tallest figure's that another view has: more than one hand and one page differ by
-)
+ALIKE_HEIGHT = 0.83  # of the tallest figure: lower ones are lower than one hand draws on one page
 PICTURE_SIDE = 1200  # pixels, at most
 FIGURE, ASIDE = (220, 40, 40), (150, 150, 150)
 

@@ -135,11 +135,14 @@ def drop_floaters(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, int, int]:
         )
     kept, tree = [solid[0]], cKDTree(solid[0].vertices)
     for part in solid[1:]:
-        share = part.area / solid[0].area
-        near = share >= KEPT_SPECK and float(tree.query(part.vertices)[0].min()) <= KEPT_DISTANCE
-        if share >= KEPT_SHARE or near:
+        if part.area >= solid[0].area * least_share(tree.query(part.vertices)[0].min()):
             kept.append(part)
     return _joined(kept), len(solid) - len(kept), len(parts) - len(solid)
+
+
+def least_share(away: np.ndarray) -> np.ndarray:
+    """Share of the largest part's area that parts (...) need to be kept, which lie so many metres away from it."""
+    return np.where(away <= KEPT_DISTANCE, KEPT_SPECK, KEPT_SHARE)
 
 
 def _joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:

@@ -182,7 +182,7 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
         f"{100 * built.missed:.1f} % of the figure's pixels in the drawings met no surface; densities were raised there.",
         f"{100 * share:.1f} % of the grid's points were left out: outside the hull or away from the surface.",
         f"{parts} and {cavities} were left out; of the parts no drawing needs {built.found.num_unneeded}.",
-        f"{counted(built.found.num_joined, 'loose part')} that drawings need were joined to the figure.",
+        f"Joined to the figure: {counted(built.found.num_joined, 'loose part')}.",
         f"{built.num_extracted} faces before decimation.",
     ]
     if built.textured is not None:
