@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 from charnerf.errors import DataError
 from charnerf.interruption import held
+from charnerf.wording import typed_or_clicked
 
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # the opening of a pipe waits for nobody
 # of a disk, of a user's share, of what a process may write
@@ -170,8 +171,8 @@ def error_words(error: BaseException) -> str:
     where, found = error.filename or "the disk", error.strerror
     if error.errno in _NO_ROOM:
         return (
-            f"{where}: can not be written to ({found}), expected room; what was written before is whole. Make room, and give the"
-            " same command again."
+            f"{where}: can not be written to ({found}), expected room; what was written before is whole. Make room, and"
+            f" {typed_or_clicked('give the same command', 'try')} again."
         )
     if error.errno in _NOT_ALLOWED:
         return f"{where}: can not be opened ({found}), expected to be allowed to. Change its permissions, or name another place."

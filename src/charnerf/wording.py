@@ -1,4 +1,30 @@
-"""Numbers in sentences."""
+"""Words of sentences: numbers, what every terminal can show, and what to do where options are typed or clicked."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_on_page: ContextVar[bool] = ContextVar("on_page", default=False)
+
+
+@contextmanager
+def worded_for_page() -> Iterator[None]:
+    """Let sentences that are made meanwhile speak of the page's names and buttons, not of options."""
+    token = _on_page.set(True)
+    try:
+        yield
+    finally:
+        _on_page.reset(token)
+
+
+def typed_or_clicked(typed: str, clicked: str) -> str:
+    """What a sentence tells to do, as a command line has it or as the page has it."""
+    return clicked if _on_page.get() else typed
+
+
+def install_words(extra: str) -> str:
+    """How an optional part of the package is installed."""
+    return f"{typed_or_clicked('Install', 'Whoever runs this page can install')} it: pip install 'charnerf[{extra}]'."
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:

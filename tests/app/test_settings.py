@@ -3,7 +3,6 @@
 import pytest
 
 from charnerf.app.settings import FIELDS, read_plan
-from charnerf.app.words import page_words
 from charnerf.errors import ConfigError
 from charnerf.reconstruction.options import ReconstructionOptions
 
@@ -52,26 +51,3 @@ def test_a_filled_form_is_taken_over():
 def test_a_wrong_value_is_named_as_the_page_names_it(values, label):
     with pytest.raises(ConfigError, match=label):
         read_plan(values)
-
-
-def test_sentences_speak_of_the_page_and_not_of_options(tmp_path):
-    said = (
-        f"{tmp_path}/7/hero front.png: found 9 figures, expected at most 8: crop it to the views of one character, or give them one"
-        " by one with --view.",
-        "If it looks the other way, say --side right, or of a sheet --figure right=N.",
-        "By the colours it shows the character's left side. If it does, say --side left, or of a sheet --figure left=N.",
-        "Paint the background in one colour, save the figure with a transparent one, or take --segmenter rembg.",
-        "--segmenter rembg: No module named 'rembg'. Install it: pip install 'charnerf[rembg]'.",
-        "--refine 30 adapts the model to these drawings; it is kept only where it helps.",
-        "--symmetric, if the character's left and right are alike, averages torn places out.",
-        "--smooth 10 evens the surface out.",
-        "--view back=FILE, or right=FILE for the other side: where front, sides or back lack one, it says most.",
-        "taken for ink and painted over with the colours beside them (--keep-ink leaves them).",
-    )
-    shown = [page_words(text, tmp_path) for text in said]
-    assert not any("--" in text or str(tmp_path) in text for text in shown)
-    assert (
-        shown[0]
-        == "hero front.png: found 9 figures, expected at most 8: crop it to the views of one character."
-    )
-    assert shown[1] == "If it looks the other way, call it right."

@@ -9,10 +9,11 @@ from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array
 from charnerf.drawings.options import ReadingOptions
 from charnerf.drawings.turnaround import read_views
-from charnerf.drawings.viewpoints import turnaround
+from charnerf.drawings.viewpoints import turnaround, viewpoint
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import angles_from_direction, project
 from charnerf.reconciling.agreement import iou
+from charnerf.wording import worded_for_page
 from support.painted import cropped, noisy_paper, on_background, paint
 
 VIEWS = ("front", "side", "back")
@@ -147,6 +148,19 @@ def test_a_back_that_is_no_mirrored_front_is_warned_of():
     assert any("better unmirrored" in one for one in traced.warnings)
     other = read_turnaround(front, side, side, size=SIZE)
     assert any("differ in pose" in one for one in other.warnings)
+
+
+def test_on_the_page_sentences_name_buttons_and_no_options():
+    front, side, back = _arrays(paint(view) for view in VIEWS)
+    with worded_for_page():
+        read = read_turnaround(front, side, back, size=SIZE)
+        guessed = read_views({viewpoint("front"): front, viewpoint("back"): back}, size=SIZE)
+    told = " ".join((*read.assumptions, *read.warnings, *guessed.warnings))
+    assert (
+        "If it looks the other way, call it right." in told
+        and "“As drawn” takes" in told
+        and "--" not in told
+    )
 
 
 def test_what_was_assumed_is_told_and_drawn(reference):

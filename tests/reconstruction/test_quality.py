@@ -7,6 +7,7 @@ import pytest
 from charnerf.meshing.options import MeshOptions
 from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.reconstruction.quality import Quality, Silhouette, quality_words, suggestions, surface_words
+from charnerf.wording import worded_for_page
 
 CLEAN = Quality(
     silhouettes=(Silhouette("front", 0.97, 0.97), Silhouette("back", 0.9, 0.95)),
@@ -35,6 +36,16 @@ def test_closed_is_not_all(worse):
     assert all(option in advice for option in ("--refine", "--symmetric", "--smooth", "--view"))
     used = ReconstructionOptions(mesh=MeshOptions(smooth=10), symmetric=True, refine_seconds=30.0)
     assert suggestions(frayed, used, num_drawings=4) == []
+
+
+def test_on_the_page_advice_names_buttons_and_no_options():
+    frayed = replace(CLEAN, dropped=49)
+    with worded_for_page():
+        advice = suggestions(frayed, ReconstructionOptions(), num_drawings=3)
+    assert len(advice) == 4 and "--" not in " ".join(advice)
+    assert advice[0].startswith("Refine (30 seconds) adapts") and advice[3].startswith(
+        "A drawing of the back"
+    )
 
 
 def test_a_drawing_that_is_not_met_is_named():

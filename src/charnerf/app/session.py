@@ -1,6 +1,7 @@
 """What one open page works on: its pictures, how they were read, its job and what was made; and whoever is to be told of it."""
 
 import asyncio
+import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,6 @@ from typing import Any
 from charnerf.app.answers import Found, Product, Recognized
 from charnerf.app.figures import Figure
 from charnerf.app.settings import Plan, Reading
-from charnerf.app.words import page_words
 from charnerf.app.worker import Worker
 from charnerf.progress import Moment
 
@@ -122,8 +122,8 @@ class Session:
             listener.set()
 
     def words(self, text: str) -> str:
-        """A sentence as the page says it."""
-        return page_words(text, self.folder)
+        """A sentence with files by the names that they came with: each lies in a numbered folder of the session's."""
+        return re.sub(rf"{re.escape(str(self.folder))}/(\d+/)?", "", text)
 
     def state(self, place: int | None) -> dict[str, Any]:
         """All that the page shows.

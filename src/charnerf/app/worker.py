@@ -18,6 +18,7 @@ from charnerf.errors import CharNeRFError
 from charnerf.files import error_words
 from charnerf.interruption import end_with_parent, leave_signals_to_parent
 from charnerf.progress import Moment, reported_to
+from charnerf.wording import worded_for_page
 
 TELL_EVERY = 0.2  # seconds between two moments of one stage
 
@@ -104,7 +105,7 @@ def _answer(connection: Connection, make: Callable[..., Any], arguments: tuple[A
         except EOFError:
             return
         try:
-            with reported_to(_Teller(connection)):
+            with reported_to(_Teller(connection)), worded_for_page():
                 made = make(*arguments) if made is None else made
                 answer = ("done", getattr(made, name)(**keywords))
         except (CharNeRFError, OSError) as error:

@@ -13,6 +13,7 @@ from skimage.measure import label
 from charnerf.drawings.load import Drawing
 from charnerf.errors import DataError
 from charnerf.pictures import on_white
+from charnerf.wording import typed_or_clicked
 
 RING = 0.02  # of the longer side: the border whose colours tell the background
 MODE_TOLERANCE = 14.0  # CIELAB distance from the commonest border colour that still is background
@@ -69,7 +70,11 @@ def find_background(drawing: Drawing) -> Background:
             raise DataError(
                 f"{drawing.name}: found a border of which only {100 * plain:.0f} % is of one colour, expected a "
                 "plain background or "
-                "alpha. Paint the background in one colour, save the figure with a transparent one, or take --segmenter rembg."
+                "alpha. Paint the background in one colour, save the figure with a transparent one, or "
+                + typed_or_clicked(
+                    "take --segmenter rembg.",
+                    "set Background to a network (Options, Drawings) and add it again.",
+                )
             )
         paper = _fit_background(lab, ring, inlier)
         distance = np.linalg.norm(lab - paper, axis=-1)

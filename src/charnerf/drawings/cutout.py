@@ -23,6 +23,7 @@ from charnerf.drawings.surroundings import (
 )
 from charnerf.errors import DataError
 from charnerf.pictures import on_white
+from charnerf.wording import typed_or_clicked
 
 ALPHA_SHARE = 0.04  # of the pixels must be transparent for alpha to count (rounded corners do not)
 SPECK_SHARE = 0.0005  # of the figure's area: smaller parts are noise
@@ -101,9 +102,9 @@ def _check_figure(figure: np.ndarray, name: str) -> None:
     count = count_figures(figure)
     if count > 1:
         raise DataError(
-            f"{name}: found {count} figures side by side, expected one: it looks like a sheet. Give it alone, as"
-            " `charnerf reconstruct SHEET -o DIR`, or crop it to one figure. If it is one, its colours may be too near to the"
-            " background's: save it with a transparent background."
+            f"{name}: found {count} figures side by side, expected one: it looks like a sheet."
+            f" {typed_or_clicked('Give it alone, as `charnerf reconstruct SHEET -o DIR`, or crop', 'Crop')} it to one figure. If"
+            " it is one, its colours may be too near to the background's: save it with a transparent background."
         )
     share = float(figure.mean())
     if share < 0.002:

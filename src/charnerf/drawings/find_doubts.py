@@ -13,15 +13,12 @@ from charnerf.drawings.drawn_figure import DrawnFigure
 from charnerf.drawings.naming import colors_look_left, outline_of_front
 from charnerf.drawings.palette import FEW_SHARED, palette, shared_colors
 from charnerf.drawings.surroundings import cut_edges
-from charnerf.drawings.viewpoints import between_square_ones
+from charnerf.drawings.viewpoints import between_square_ones, call_it
 from charnerf.geometry.world import HEIGHT
 from charnerf.reconciling import Reconciliation
+from charnerf.wording import typed_or_clicked
 
 LEAST_AGREEMENT = 0.85  # IoU of two outlines that ought to be one; below, the user is warned
-GUESSED = (
-    "is not drawn: it was guessed, as deep as a three-quarter view says or nearly as deep as wide. Give a drawing of it;"
-    " --as-drawn takes the others alone."
-)
 
 
 def find_doubts(
@@ -40,11 +37,11 @@ def find_doubts(
         Doubt(
             one.name,
             "seen from between front, side and back, which the released weights were trained on: with it pictures came out worse"
-            " (docs/drawings.md). Compare without it.",
+            f"{typed_or_clicked(' (docs/drawings.md)', '')}. Compare without it.",
         )
         for one in between_square_ones([figure.viewpoint for figure in figures])
     ]
-    guessed = [Doubt(figure.drawing.name, GUESSED) for figure in figures if figure.is_guessed]
+    guessed = [Doubt(figure.drawing.name, _guessed()) for figure in figures if figure.is_guessed]
     apart = (*_disagreements(agreement, figures), *_other_designs(canvases, figures))
     return (
         *guessed,
@@ -54,6 +51,13 @@ def find_doubts(
         *_quarters(canvases, figures),
         *apart,
         *between,
+    )
+
+
+def _guessed() -> str:
+    return (
+        "is not drawn: it was guessed, as deep as a three-quarter view says or nearly as deep as wide. Give a drawing of it;"
+        f" {typed_or_clicked('--as-drawn', '“As drawn”')} takes the others alone."
     )
 
 
@@ -95,7 +99,7 @@ def _turned_sides(canvases: Sequence[np.ndarray], figures: Sequence[DrawnFigure]
             other = "right" if name == "left" else "left"
             sentence = (
                 f"by the colours of front and back it looks to the picture's {other}, and so shows the character's {other} side."
-                f" If it does, say --side {other}, or of a sheet --figure {other}=N."
+                f" If it does, {call_it(other)}."
             )
             doubts.append(Doubt(figure.drawing.name, sentence, DoubtKind.MIRRORED))
     return doubts
@@ -113,9 +117,13 @@ def _quarters(canvases: Sequence[np.ndarray], figures: Sequence[DrawnFigure]) ->
         overlap = outline_of_front(canvas, front)
         if overlap is not None:
             azimuth = 45 if figure.viewpoint.name == "left" else 315
+            named = typed_or_clicked(
+                f"say --view {azimuth}=FILE in its place, or of a sheet --figure {azimuth}=N",
+                f"call it {azimuth} degrees",
+            )
             sentence = (
-                f"its outline is nearly the front's (IoU {overlap:.2f}): is it a three-quarter view? If so, say --view"
-                f" {azimuth}=FILE in its place, or of a sheet --figure {azimuth}=N: a side is guessed from it."
+                f"its outline is nearly the front's (IoU {overlap:.2f}): is it a three-quarter view? If so, {named}: a side is"
+                " guessed from it."
             )
             doubts.append(Doubt(figure.drawing.name, sentence))
     return doubts

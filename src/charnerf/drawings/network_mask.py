@@ -9,9 +9,9 @@ from PIL import Image
 from charnerf.drawings.load import Drawing
 from charnerf.errors import ConfigError, DependencyError
 from charnerf.pictures import on_white, to_bytes
+from charnerf.wording import install_words, typed_or_clicked
 
 MODEL = "isnet-anime"  # trained on drawn figures
-INSTALL = "Install it: pip install 'charnerf[rembg]'."
 
 
 @final
@@ -30,11 +30,11 @@ class NetworkMask:
         session_type = _session_types().get(model)
         if session_type is None:
             raise ConfigError(
-                f"--segmenter: found the model '{model[:60]}', expected one of {', '.join(sorted(_session_types()))}."
+                f"{_option()}: found the model '{model[:60]}', expected one of {', '.join(sorted(_session_types()))}."
             )
         if session_type.resolve_existing(f"{model}.onnx") is None:
             raise ConfigError(
-                f"--segmenter: found no {model}.onnx, expected the model's file in {Path(session_type.model_dir())}."
+                f"{_option()}: found no {model}.onnx, expected the model's file in {Path(session_type.model_dir())}."
                 f" Fetch it once: rembg d {model}."
             )
         self.model = model
@@ -49,11 +49,15 @@ class NetworkMask:
         return np.asarray(mask, np.float32) / 255.0
 
 
+def _option() -> str:
+    return typed_or_clicked("--segmenter", "The network for backgrounds")
+
+
 def _session_types() -> dict[str, Any]:
     """Models of rembg that work on this machine with one file and answer with one mask, by name."""
     try:
         from rembg.sessions import sessions_class
     except ImportError as error:
-        raise DependencyError(f"--segmenter rembg: {error}. {INSTALL}") from error
+        raise DependencyError(f"{_option()}: {error}. {install_words('rembg')}") from error
     named = {one.name(): one for one in sessions_class if one.is_local()}
     return {name: one for name, one in named.items() if not name.endswith(("_custom", "_cloth_seg", "sam"))}

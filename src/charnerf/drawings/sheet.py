@@ -15,6 +15,7 @@ from charnerf.drawings.background import find_background
 from charnerf.drawings.cutout import SPECK_SHARE, has_alpha
 from charnerf.drawings.load import Drawing
 from charnerf.errors import DataError
+from charnerf.wording import typed_or_clicked
 
 MOST_FIGURES = 8
 JOINED = 0.0015  # share of the sheet's longer side: parts nearer to each other than this hang together
@@ -86,7 +87,7 @@ def find_figures(drawing: Drawing) -> Sheet:
     if len(chosen) > MOST_FIGURES:
         raise DataError(
             f"{drawing.name}: found {len(chosen)} figures, expected at most {MOST_FIGURES}: crop it to the views of one"
-            " character, or give them one by one with --view."
+            f" character{typed_or_clicked(', or give them one by one with --view', '')}."
         )
     owners = _owners(regions, chosen, groups)
     order = _reading_order([regions[index].bbox for index in chosen])

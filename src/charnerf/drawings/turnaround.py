@@ -19,13 +19,14 @@ from charnerf.drawings.load import Drawing, drawing_from_array, load_drawing
 from charnerf.drawings.missing_side import missing_side
 from charnerf.drawings.options import ReadingOptions, Segment
 from charnerf.drawings.picture import draw_assumptions
-from charnerf.drawings.viewpoints import NEAR, Viewpoint, check_viewpoints, is_turned
+from charnerf.drawings.viewpoints import NEAR, Viewpoint, call_it, check_viewpoints, is_turned
 from charnerf.errors import DataError
 from charnerf.geometry.cameras import direction_from_angles
 from charnerf.geometry.framing import framing_cameras
 from charnerf.geometry.world import HEIGHT
 from charnerf.reconciling import Reconciliation, reconcile
 from charnerf.types import SourceViews
+from charnerf.wording import typed_or_clicked
 
 Picture = str | Path | np.ndarray
 DETAIL = (256, 1024)  # pixels a side, least and most, of the detailed views
@@ -192,7 +193,7 @@ def _without_ink(figures: Sequence[DrawnFigure]) -> tuple[list[DrawnFigure], tup
     ]
     return painted, (
         f"{100 * share:.0f} % of the outlines are drawn as lines: these were taken for ink and painted over with the colours"
-        " beside them (--keep-ink leaves them).",
+        f" beside them ({typed_or_clicked('--keep-ink leaves', '“Keep ink” leaves')} them).",
     )
 
 
@@ -232,7 +233,7 @@ def _assumptions(figures: Sequence[DrawnFigure], extent: float, size: int) -> li
             side, other = ("left", "right") if figure.viewpoint.name == "left" else ("right", "left")
             lines.append(
                 f"The side drawing was taken as the character's {side} side: it looks towards the picture's {side}. If it"
-                f" looks the other way, say --side {other}, or of a sheet --figure {other}=N."
+                f" looks the other way, {call_it(other)}."
             )
     return lines
 

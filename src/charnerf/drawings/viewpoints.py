@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from charnerf.errors import DataError
+from charnerf.wording import typed_or_clicked
 
 Drawn = TypeVar("Drawn")
 
@@ -80,6 +81,11 @@ def between_square_ones(viewpoints: Sequence[Viewpoint]) -> list[Viewpoint]:
     if not ({0.0, 180.0} <= azimuths and azimuths & {90.0, 270.0}):
         return []
     return [one for one in viewpoints if one.azimuth_deg % 90.0]
+
+
+def call_it(view: str) -> str:
+    """What to do where a figure is seen from somewhere else than it was said to be, in the middle of a sentence."""
+    return typed_or_clicked(f"say --side {view}, or of a sheet --figure {view}=N", f"call it {view}")
 
 
 def is_turned(azimuth_deg: float) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from charnerf.errors import DataError, DependencyError
 from charnerf.meshing.exported import ExportedMesh
 from charnerf.surfaces.color import linear_from_srgb
+from charnerf.wording import install_words
 
 
 def check_usd() -> None:
@@ -21,8 +22,7 @@ def check_usd() -> None:
         from pxr import Usd  # noqa: F401
     except ImportError as error:
         raise DependencyError(
-            f".usdz: Pixar's library is missing ({error}). Install it by `pip install 'charnerf[usd]'`, or "
-            "choose .glb."
+            f".usdz: Pixar's library is missing ({error}). {install_words('usd')} Or choose .glb."
         ) from error
 
 

@@ -16,7 +16,7 @@ from charnerf.meshing.extract import fit_height
 from charnerf.meshing.lod import num_parts
 from charnerf.reconstruction.options import ReconstructionOptions
 from charnerf.surfaces.render import render_clay
-from charnerf.wording import counted
+from charnerf.wording import counted, typed_or_clicked
 
 # Beyond one of these a surface looks frayed; measured on drawings by artists: docs/drawings.md
 MOST_HAZE = 0.1
@@ -142,14 +142,17 @@ def suggestions(quality: Quality, options: ReconstructionOptions, *, num_drawing
             " and one size fit better; is each file seen from where it was given?"
         )
     if options.refine_seconds is None:
-        lines.append("--refine 30 adapts the model to these drawings; it is kept only where it helps.")
+        named = typed_or_clicked("--refine 30", "Refine (30 seconds)")
+        lines.append(f"{named} adapts the model to these drawings; it is kept only where it helps.")
     if quality.is_frayed and not options.symmetric:
-        lines.append("--symmetric, if the character's left and right are alike, averages torn places out.")
+        named = typed_or_clicked("--symmetric", "Symmetric")
+        lines.append(f"{named}, if the character's left and right are alike, averages torn places out.")
     if quality.is_frayed and options.mesh.smooth == 0:
-        lines.append("--smooth 10 evens the surface out.")
+        named = typed_or_clicked("--smooth 10", "Smoothing (10)")
+        lines.append(f"{named} evens the surface out.")
     if quality.is_frayed and num_drawings <= FEW_VIEWS:
+        named = typed_or_clicked("--view back=FILE, or right=FILE for", "A drawing of the back, or of")
         lines.append(
-            "--view back=FILE, or right=FILE for the other side: where front, sides or back lack one, it says most about what is"
-            " torn."
+            f"{named} the other side: where front, sides or back lack one, it says most about what is torn."
         )
     return lines
