@@ -25,6 +25,7 @@ from charnerf.foreign.shot import read_mask
 from charnerf.foreign.transforms_json import TransformsJson, camera_files
 from charnerf.geometry.carving import spread
 from charnerf.parallel import in_processes
+from charnerf.wording import counted
 
 MOST_ALIKE = 3  # findings of one kind that are told of a character
 PICTURE_SIDE = 256  # pixels of evidence
@@ -150,7 +151,8 @@ def _told(findings: Sequence[Finding]) -> list[Finding]:
         shown = alike[:MOST_ALIKE]
         if more > 0:
             shown[-1] = replace(
-                last, found=f"{last.found}; and {more} more views of this character have this fault"
+                last,
+                found=f"{last.found}; and {counted(more, 'more view')} of this character with this fault",
             )
         told += [replace(one, picture=_small(one.picture)) for one in shown]
     return told

@@ -7,6 +7,7 @@ from scipy import ndimage
 
 from charnerf.doctor.finding import Finding
 from charnerf.doctor.views import View
+from charnerf.wording import counted
 
 FAINT = 0.05  # alpha
 MOST_FAINT = 0.02  # share of a picture that may be faint: soft edges are less
@@ -45,12 +46,12 @@ def figure_findings(view: View, rgba: np.ndarray, alpha: np.ndarray | None) -> I
         )  # fmt: skip
         return
     faint = (alpha > 0.0) & (alpha < FAINT)
-    specks = _specks(shown)
+    specks = _specks(alpha)
     if faint.mean() > MOST_FAINT or specks.any():
         found = (
             f"alpha between 0 and {FAINT} on {100 * faint.mean():.0f} % of the picture"
             if faint.mean() > MOST_FAINT
-            else f"{ndimage.label(specks)[1]} opaque specks apart from the figure, {int(specks.sum())} pixels"
+            else f"{counted(ndimage.label(specks)[1], 'opaque speck')} apart from the figure, {counted(int(specks.sum()), 'pixel')}"
         )
         yield Finding(
             "dirty background", where, found, "alpha 0 around the figure", "Set what is not the figure to transparent.",
@@ -65,16 +66,23 @@ def figure_findings(view: View, rgba: np.ndarray, alpha: np.ndarray | None) -> I
         )  # fmt: skip
 
 
-def _specks(shown: np.ndarray) -> np.ndarray:
-    """Small pieces far from the largest one, (H, W): not hands, hats or props, which are near or large."""
-    labels, count = ndimage.label(shown, structure=np.ones((3, 3)))
+def _specks(alpha: np.ndarray) -> np.ndarray:
+    """Small opaque pieces far from the largest one, (H, W): not hands, hats or props, which are near or large.
+
+    What soft pixels join to the figure is a part of it: a staff thinner than a pixel is opaque here and there.
+    """
+    shown = alpha > 0.5
+    labels, count = ndimage.label(alpha >= FAINT, structure=np.ones((3, 3)))
     if count < 2:
         return np.zeros_like(shown)
+    labels = labels * shown
     sizes = ndimage.sum_labels(shown, labels, range(1, count + 1))
     largest = labels == 1 + int(np.argmax(sizes))
     apart = ndimage.distance_transform_edt(~largest)
     few = max(2.0, 0.002 * shown.sum())
-    return np.isin(labels, 1 + np.flatnonzero(sizes <= few)) & (apart > 0.1 * max(shown.shape))
+    return np.isin(labels, 1 + np.flatnonzero((sizes > 0) & (sizes <= few))) & (
+        apart > 0.1 * max(shown.shape)
+    )
 
 
 def _border(values: np.ndarray) -> np.ndarray:
