@@ -45,14 +45,20 @@ def dataset(tmp_path_factory):
 def test_a_command_ends_with_what_was_made_where_and_how_long(tmp_path, capsys):
     close(
         Summary(
-            "a ball", (tmp_path / "ball.glb",), 0.0, quality="round", try_=("more", "less"), next_=("go",)
+            "a ball",
+            (tmp_path / "ball.glb",),
+            0.0,
+            quality="round",
+            doubts=("is it one?",),
+            try_=("more", "less"),
+            next_=("go",),
         ),
         None,
     )
     lines = capsys.readouterr().err.splitlines()
     assert lines[1] == "made      a ball" and lines[2] == f"where     {tmp_path / 'ball.glb'}"
     assert lines[3] == "how good  round" and lines[4].startswith("how long  ")
-    assert lines[5:] == ["try       more", "          less", "next      go"]
+    assert lines[5:] == ["doubtful  is it one?", "try       more", "          less", "next      go"]
 
 
 def test_programs_get_json_and_quiet_leaves_standard_error_empty(dataset, tmp_path, capsys):

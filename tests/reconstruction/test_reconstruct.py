@@ -12,6 +12,7 @@ import torch
 import trimesh
 from PIL import Image
 
+from charnerf.drawings.read_sheet import read_sheet
 from charnerf.drawings.viewpoints import turnaround
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.bounds import Bounds
@@ -90,6 +91,19 @@ def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
     for line in text.splitlines():  # every file shown is there
         for part in line.split("](")[1:]:
             assert (done.report.parent / part.split(")")[0]).exists()
+
+
+def test_what_was_said_of_the_sheet_is_told_in_the_report_too(tmp_path, drawings):
+    page = Image.fromarray(
+        np.concatenate([np.asarray(Image.open(file)) for file in drawings.values()], axis=1)
+    )
+    page.save(tmp_path / "page.png")
+    read = replace(read_sheet(tmp_path / "page.png"), warnings=("Figure 2 is a sword: leave it out.",))
+    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, read.drawings, sheet=read)
+    text = done.report.with_suffix(".md").read_text()
+    assert all(line in text for line in (*read.assumptions, *read.warnings))
+    facts = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert facts["warnings"] == list(done.warnings) and done.warnings[0] == read.warnings[0]
 
 
 def test_a_second_run_replaces_its_pieces_and_nothing_else(tmp_path, drawings):

@@ -15,6 +15,7 @@ from charnerf.errors import ConfigError
 if TYPE_CHECKING:
     import numpy as np
 
+    from charnerf.drawings.read_sheet import SheetViews
     from charnerf.drawings.viewpoints import Viewpoint
 
 Files = Annotated[
@@ -89,10 +90,10 @@ def reading_options(
 
 @dataclass(frozen=True)
 class GivenDrawings:
-    """Drawings by where they are seen from, and the sheet that they were found on, drawn with what was taken for what."""
+    """Drawings by where they are seen from, and the sheet that they were found on."""
 
     drawings: Mapping["Viewpoint", "Path | np.ndarray"]
-    sheet: "np.ndarray | None" = None
+    sheet: "SheetViews | None" = None
 
     def __post_init__(self) -> None:
         """Check, before the model is loaded, that they are of views apart.
@@ -150,7 +151,7 @@ def given_drawings(
         )
         for line in (*read.assumptions, *(f"warning: {one}" for one in read.warnings)):
             say(line)
-        return GivenDrawings(read.drawings, read.picture)
+        return GivenDrawings(read.drawings, read)
     if len(files) > 3:
         raise ConfigError(
             f"{' '.join(map(str, files))}: found {len(files)} files, expected FRONT SIDE BACK; give further ones by --view."

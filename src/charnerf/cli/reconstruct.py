@@ -118,6 +118,7 @@ def _summary(done: "Reconstruction", frames: int, began: float) -> Summary:
         files=(done.report, done.mesh, done.turntable),
         began=began,
         quality=quality_words(done.quality),
+        doubts=done.warnings,
         try_=done.suggestions,
         facts=done.facts,
     )

@@ -34,6 +34,7 @@ class Summary:
         files: Where it lies, what is to be opened first at first.
         began: When the command began, by `time.perf_counter`.
         quality: How good it is, in words; "" where nothing can be said.
+        doubts: What looked wrong with what was given: it was said long before.
         try_: What may make it better.
         next_: Commands that go on from here.
         facts: More for programs.
@@ -43,6 +44,7 @@ class Summary:
     files: Sequence[Path]
     began: float
     quality: str = ""
+    doubts: Sequence[str] = ()
     try_: Sequence[str] = ()
     next_: Sequence[str] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
@@ -58,6 +60,7 @@ def close(summary: Summary, json_file: Path | None) -> None:
         "where": [", ".join(map(str, summary.files))] if summary.files else [],
         "how good": [summary.quality] if summary.quality else [],
         "how long": [seconds_text(seconds)],
+        "doubtful": summary.doubts,
         "try": summary.try_,
         "next": summary.next_,
     }

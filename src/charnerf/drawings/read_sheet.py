@@ -73,8 +73,9 @@ def read_sheet(
     count = len(sheet.figures)
     if count < 2:
         raise DataError(
-            f"{drawing.name}: found {'one' if count else 'no'} figure, expected a sheet with at least two views. Give views one by"
-            " one: FRONT SIDE BACK, or --view 0=FRONT --view 90=SIDE."
+            f"{drawing.name}: found {'one' if count else 'no'} figure, expected a sheet with at least two views."
+            " If it shows more, they touch, or their background is not of one colour. Crop it, and give views one by one: FRONT"
+            " SIDE BACK, or --view 0=FRONT --view 90=SIDE."
         )
     canvases = canvases_to_name([one.drawing for one in sheet.figures])
     views, doubtful = _views(drawing, canvases, order, figures or {})
@@ -205,8 +206,7 @@ def _warnings(
 ) -> list[str]:
     lines = _unlike_heights(drawing, sheet, chosen)
     if doubtful:
-        names = {index: view.name for view, index in chosen}
-        shown = [names.get(index, "-") for index in range(len(sheet.figures))]
+        shown = _order(sheet, chosen)
         lines.append(
             f"{drawing.name}: which view is which is doubtful. If it is not {','.join(shown)}, say so: --order"
             f" {','.join(reversed(shown))}, say, or --figure back=1."
@@ -224,6 +224,12 @@ def _warnings(
     return lines
 
 
+def _order(sheet: Sheet, chosen: Sequence[tuple[Viewpoint, int]]) -> list[str]:
+    """What --order says where these figures are taken and the others left out."""
+    names = {index: view.name for view, index in chosen}
+    return [names.get(index, "-") for index in range(len(sheet.figures))]
+
+
 def _unlike_heights(drawing: Drawing, sheet: Sheet, chosen: Sequence[tuple[Viewpoint, int]]) -> list[str]:
     """Figures much lower than the tallest one: a sword beside its owner, or a figure of which a part was not found."""
     heights = {index: sheet.figures[index].box[3] - sheet.figures[index].box[1] for _, index in chosen}
@@ -231,7 +237,7 @@ def _unlike_heights(drawing: Drawing, sheet: Sheet, chosen: Sequence[tuple[Viewp
     return [
         f"{drawing.name}: figure {index + 1} ({view.name}) is {100 * heights[index] / heights[tallest]:.0f} % as tall as figure"
         f" {tallest + 1}, expected {100 * ALIKE_HEIGHT:.0f} % or more: is it a view of the character, and whole? If not, leave it"
-        " out with `-` in --order, or give the views one by one."
+        f" out by --order {','.join(_order(sheet, [one for one in chosen if one[1] != index]))}, or give the views one by one."
         for view, index in chosen
         if heights[index] < ALIKE_HEIGHT * heights[tallest]
     ]

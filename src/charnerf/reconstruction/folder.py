@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image
 
 from charnerf.drawings.options import ReadingOptions
+from charnerf.drawings.read_sheet import SheetViews
 from charnerf.drawings.turnaround import Picture, Turnaround
 from charnerf.drawings.viewpoints import Viewpoint
 from charnerf.files import check_folder, write_folder_aside
@@ -52,7 +53,7 @@ class Reconstruction:
         quality: What it is worth.
         suggestions: What may make it better.
         facts: The content of report.json.
-        warnings: Sentences.
+        warnings: What looked wrong, sentences.
         seconds: By stage.
     """
 
@@ -77,7 +78,7 @@ def reconstruct(
     given: Mapping[Viewpoint, Picture],
     *,
     reading: ReadingOptions | None = None,
-    sheet: np.ndarray | None = None,
+    sheet: SheetViews | None = None,
     say: Callable[[str], object] = lambda line: None,
 ) -> Reconstruction:
     """Reconstruct a character from drawings into a folder.
@@ -91,7 +92,7 @@ def reconstruct(
         options: What is made.
         given: Drawings by where they are seen from; where they disagree, the first rules.
         reading: How the drawings are read.
-        sheet: RGB picture of the sheet that they were found on, shown in the report; None where there was none.
+        sheet: The sheet that they were found on, told in the report; None where there was none.
         say: Gets what was assumed and made, sentence by sentence.
 
     Raises:
@@ -131,7 +132,7 @@ def _moved(made: Made, output: Path, hero: Hero, baked: Hero) -> Reconstruction:
         quality=made.quality,
         suggestions=tuple(made.suggestions),
         facts=report_facts(made),
-        warnings=made.drawings.warnings,
+        warnings=made.warnings,
         seconds=made.seconds,
     )
 
@@ -202,7 +203,7 @@ def _write(
     pictures: list[np.ndarray],
     built: BuiltMesh,
     drawings: Turnaround,
-    sheet: np.ndarray | None,
+    sheet: SheetViews | None,
     refined: Finetuned | None,
     seconds: dict[str, float],
     weights: str,
@@ -217,7 +218,7 @@ def _write(
     Image.fromarray(drawings.picture).save(folder / "drawings.png")
     model_sheet(drawings, pictures).save(folder / "sheet.png")
     if sheet is not None:
-        Image.fromarray(sheet).save(folder / "sheet_as_read.png")
+        Image.fromarray(sheet.picture).save(folder / "sheet_as_read.png")
     if refined is not None:
         plot_curve(refined, folder / "refinement.png")
     quality = measure(built, drawings, pictures, height=options.mesh.height)
@@ -233,7 +234,7 @@ def _write(
         seconds=seconds,
         weights=weights,
         refined=refined,
-        from_sheet=sheet is not None,
+        sheet=sheet,
     )
     write_report(folder, "Reconstructed character", report_blocks(made))
     (folder / "report.json").write_text(json.dumps(report_facts(made), indent=2) + "\n", encoding="utf-8")

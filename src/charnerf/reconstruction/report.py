@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from charnerf.drawings.read_sheet import SheetViews
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import curve_table, summary_lines
@@ -46,7 +47,7 @@ class Made:
         seconds: By stage.
         weights: Where the model came from.
         refined: How the weights were adapted to the drawings, if they were.
-        from_sheet: Whether they were found on a sheet, whose picture lies beside.
+        sheet: The sheet that they were found on, if they were; its picture lies beside.
     """
 
     folder: Path
@@ -60,7 +61,17 @@ class Made:
     seconds: dict[str, float]
     weights: str
     refined: Finetuned | None = None
-    from_sheet: bool = False
+    sheet: SheetViews | None = None
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What was assumed about the sheet, then about its drawings."""
+        return (*(() if self.sheet is None else self.sheet.assumptions), *self.drawings.assumptions)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What looked wrong with the sheet, then with its drawings."""
+        return (*(() if self.sheet is None else self.sheet.warnings), *self.drawings.warnings)
 
 
 def report_blocks(made: Made) -> list[Block]:
@@ -111,8 +122,8 @@ def report_facts(made: Made) -> dict[str, Any]:
             "texture": None if made.built.textured is None else made.built.textured.size,
             "level": float(made.built.level),
         },
-        "assumptions": list(made.drawings.assumptions),
-        "warnings": list(made.drawings.warnings),
+        "assumptions": list(made.assumptions),
+        "warnings": list(made.warnings),
         "seconds": made.seconds,
         "weights": made.weights,
         "refined": None if made.refined is None else made.refined.kept,
@@ -122,14 +133,14 @@ def report_facts(made: Made) -> dict[str, Any]:
 def _drawings(made: Made) -> list[Block]:
     """What was assumed, drawn and said."""
     blocks: list[Block] = [Heading("What was assumed about the drawings")]
-    if made.drawings.warnings:
-        blocks.append(Bullets(made.drawings.warnings, warnings=True))
-    if made.from_sheet:
+    if made.warnings:
+        blocks.append(Bullets(made.warnings, warnings=True))
+    if made.sheet is not None:
         blocks.append(
             Picture(made.folder / "sheet_as_read.png", "The sheet, its figures and what was left aside")
         )
     caption = "The drawings, cut out and aligned, and below, where any was moved, reconciled"
-    return [*blocks, Picture(made.folder / "drawings.png", caption), Bullets(made.drawings.assumptions)]
+    return [*blocks, Picture(made.folder / "drawings.png", caption), Bullets(made.assumptions)]
 
 
 def _quality(quality: Quality) -> list[Block]:
