@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from charnerf.errors import DataError
 from charnerf.files import (
     cache_folder,
+    check_folder,
     error_words,
     locked,
     write_aside,
@@ -106,6 +108,17 @@ def test_a_cache_lies_where_it_is_given_else_in_the_users(monkeypatch: pytest.Mo
     assert cache_folder() == Path("/home/me/.cache/charnerf")
     monkeypatch.setenv("XDG_CACHE_HOME", "/fast")
     assert cache_folder(None) == Path("/fast/charnerf")
+
+
+@pytest.mark.parametrize("below", ["", "sub", "sub/sub"])
+def test_a_folder_below_a_file_or_a_dead_link_is_refused_before_the_work(tmp_path: Path, below: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "link").symlink_to(tmp_path / "gone")
+    for name, found in (("file", "a file"), ("link", "a link to nothing")):
+        with pytest.raises(DataError, match=f"{name}: found {found}, expected a folder to write to"):
+            check_folder(tmp_path / name / below)
+    check_folder(tmp_path / "new" / below)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["file", "link"]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")

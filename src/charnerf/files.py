@@ -247,12 +247,13 @@ def check_folder(path: Path) -> None:
     """Check that a folder can be written to where a command is told to, before the work.
 
     Raises:
-        DataError: If there is a file, or nothing can be written there: it is read only, full, or its name too long.
+        DataError: If there, or above, is a file, or nothing can be written there: it is read only, full, or its name too long.
     """
     try:
-        if path.exists() and not path.is_dir():
-            raise DataError(f"{path}: found a file, expected a folder to write to. Choose another.")
-        nearest = next(one for one in (path, *path.absolute().parents) if one.is_dir())
+        nearest = next(one for one in (path, *path.absolute().parents) if os.path.lexists(one))
+        if not nearest.is_dir():
+            what = "a file" if nearest.exists() else "a link to nothing"
+            raise DataError(f"{nearest}: found {what}, expected a folder to write to. Choose another.")
         with tempfile.TemporaryFile(dir=nearest) as file:
             file.write(b"x" * 4096)
     except OSError as error:
