@@ -7,10 +7,8 @@ side, a three-quarter view of the front instead. What is not given is compared w
 from __future__ import annotations
 
 import argparse
-import csv
-import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 
@@ -19,6 +17,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from benchmarks.csv_rows import write_rows
 from charnerf.drawings.align import figure_box, place
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import load_drawing
@@ -130,20 +129,17 @@ def main() -> None:
     parser.add_argument("--pictures", type=Path, help="folder for a picture of each")
     parser.add_argument("-o", "--output", type=Path, required=True, help="CSV file")
     options = parser.parse_args()
-    model, writer = weights.load(None), None
-    with options.output.open("w", newline="", encoding="utf-8") as file:
-        for folder in options.folders:
-            row, picture = measured(
-                model, folder, side_is="right" if folder.name in options.right else "left"
-            )
-            if writer is None:
-                writer = csv.DictWriter(file, row, lineterminator="\n")
-                writer.writeheader()
-            writer.writerow(row)
-            file.flush()
-            sys.stderr.write(f"{row}\n")
-            if options.pictures is not None:
-                save_png(options.pictures / f"{folder.name}.png", picture)
+    write_rows(options.output, _rows(weights.load(None), options.folders, options.right, options.pictures))
+
+
+def _rows(
+    model: Model, folders: Sequence[Path], right: Sequence[str], pictures: Path | None
+) -> Iterator[Mapping[str, object]]:
+    for folder in folders:
+        row, picture = measured(model, folder, side_is="right" if folder.name in right else "left")
+        if pictures is not None:
+            save_png(pictures / f"{folder.name}.png", picture)
+        yield row
 
 
 if __name__ == "__main__":

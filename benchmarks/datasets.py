@@ -6,8 +6,6 @@ Seconds are those of the processor, one thread: they hold on a busy machine too.
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import os
 import statistics
 import sys
@@ -15,10 +13,12 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import torch
 
+from benchmarks.csv_rows import write_rows
 from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.generated import character_seed, generate_dataset
 from charnerf.capture.renderers.blender import Blender
@@ -31,7 +31,6 @@ from charnerf.data.shards_data import ShardsData
 from charnerf.data.store import CharacterStore
 from charnerf.data.window import Window, groups_of
 from charnerf.errors import DependencyError
-from charnerf.files import write_text
 from charnerf.geometry.framing import SOURCE_ORDER
 from charnerf.inference.build import build_model
 from charnerf.losses.base import Needs
@@ -63,16 +62,18 @@ def main(arguments: Sequence[str]) -> None:
     output = parser.parse_args(arguments).output
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
-        rows = [*capture_rows(), *blender_rows(), *dataset_rows(Path(folder))]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("measure", "value", "unit"))
-    writer.writerows(
-        (row.measure, f"{row.value:.3g}" if row.value < 1000 else f"{row.value:.0f}", row.unit)
-        for row in rows
-    )
-    write_text(output, text.getvalue())
-    sys.stderr.write(text.getvalue())
+        write_rows(
+            output,
+            (
+                {
+                    "measure": row.measure,
+                    "value": f"{row.value:.3g}" if row.value < 1000 else f"{row.value:.0f}",
+                    "unit": row.unit,
+                }
+                for part in (capture_rows, blender_rows, partial(dataset_rows, Path(folder)))
+                for row in part()
+            ),
+        )
 
 
 def capture_rows() -> list[Row]:

@@ -6,8 +6,6 @@ Front and back of captured characters, whose alpha is known, are put on paper, p
 from __future__ import annotations
 
 import argparse
-import csv
-import sys
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -16,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 from skimage.measure import label
 
+from benchmarks.csv_rows import write_rows
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.cutout import Cutout, cut_out
@@ -86,14 +85,7 @@ def main() -> None:
     names = [name for split in options.split for name in names_of(info, split)]
     loaded = (load_character(options.data, name) for name in names)
     characters = [one for one in loaded if {"front", "back"} <= set(one.source_names)]
-    with options.output.open("w", newline="", encoding="utf-8") as file:
-        writer = None
-        for row in rows(characters):
-            writer = writer or csv.DictWriter(file, list(row), lineterminator="\n")
-            if not file.tell():
-                writer.writeheader()
-            writer.writerow(row)
-    sys.stderr.write(f"{len(characters)} characters: {options.output}\n")
+    write_rows(options.output, rows(characters))
 
 
 if __name__ == "__main__":

@@ -6,8 +6,6 @@ Seconds are those of the processor, one thread: they hold on a busy machine too.
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import statistics
 import sys
 import tempfile
@@ -19,12 +17,12 @@ import numpy as np
 import torch
 from PIL import Image
 
+from benchmarks.csv_rows import write_rows
 from charnerf.capture.character import CaptureOptions, capture_sources
 from charnerf.capture.dataset import capture_scene_to
 from charnerf.capture.generated import EMBEDDED, Generator, character_seed
 from charnerf.capture.people_data import people_generator
 from charnerf.capture.shapes_data import shapes_generator
-from charnerf.files import write_text
 from charnerf.pictures import bytes_on_white
 from charnerf.surfaces.scene_mesh import surface_of_scene
 from charnerf.surfaces.surface_mesh import SurfaceMesh
@@ -41,19 +39,13 @@ def main(arguments: Sequence[str]) -> None:
     options = parser.parse_args(arguments)
     torch.set_num_threads(1)
     shapes, people = shapes_generator(), people_generator(options.assets)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ("generator", "to make, s", "to capture and write, s", "characters a minute", "triangles")
-    )
-    writer.writerows(rows({"embedded characters": EMBEDDED, "shapes": shapes, "people": people}))
-    write_text(options.output / "generators.csv", text.getvalue())
-    sys.stderr.write(text.getvalue())
+    measured = rows({"embedded characters": EMBEDDED, "shapes": shapes, "people": people})
+    write_rows(options.output / "generators.csv", measured)
     picture = np.concatenate([sheet(generator) for generator in (shapes, people)])
     Image.fromarray(picture).save(options.output / "generators.jpg", quality=80, optimize=True)
 
 
-def rows(generators: dict[str, Generator]) -> list[tuple[str, str, str, str, str]]:
+def rows(generators: dict[str, Generator]) -> list[dict[str, str]]:
     """Medians of the seconds of a character, and of its triangles."""
     measured: dict[str, list[tuple[float, float, int]]] = {name: [] for name in generators}
     with tempfile.TemporaryDirectory() as folder:
@@ -72,7 +64,13 @@ def rows(generators: dict[str, Generator]) -> list[tuple[str, str, str, str, str
             statistics.median(column) for column in zip(*turns[1:], strict=True)
         )  # the first reads files
         table.append(
-            (name, f"{make:.2f}", f"{capture:.2f}", f"{60.0 / (make + capture):.0f}", f"{triangles:.0f}")
+            {
+                "generator": name,
+                "to make, s": f"{make:.2f}",
+                "to capture and write, s": f"{capture:.2f}",
+                "characters a minute": f"{60.0 / (make + capture):.0f}",
+                "triangles": f"{triangles:.0f}",
+            }
         )
     return table
 

@@ -7,9 +7,7 @@ place and size, poses; with all of them; and where poses differ without reconcil
 from __future__ import annotations
 
 import argparse
-import csv
-import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.csv_rows import write_rows
 from charnerf.data.characters import Character
 from charnerf.data.drawing_style import EXACT, random_style
 from charnerf.drawings.artist import LEVELS, Mistakes, captured, in_style
@@ -83,31 +82,30 @@ def main() -> None:
     parser.add_argument("--part", action="append", choices=PARTS, help="only this one; may be repeated")
     parser.add_argument("-o", "--output", type=Path, required=True, help="CSV file")
     options = parser.parse_args()
+    write_rows(options.output, _rows(options))
+
+
+def _rows(options: argparse.Namespace) -> Iterator[dict[str, str]]:
+    """Every part, with reconciled views and, where they differ in pose, without."""
     model = weights.load(None)
     mesh = partial(find_surface, options=MeshOptions(height=None))
-    with options.output.open("w", newline="", encoding="utf-8") as file:
-        titles = ["drawn with", "reconciled", *OF_DRAWINGS.values(), *FIGURES.values()]
-        writer = csv.DictWriter(file, titles, lineterminator="\n")
-        writer.writeheader()
-        for part in options.part or PARTS:
-            for reconciled in (True, False) if part in POSED else (True,):
-                redrawn = partial(
-                    drawn_with, part, level=options.level, size=model.image_size, reconciled=reconciled
-                )
-                found = evaluate(
-                    model.network,
-                    model.renderer,
-                    options.data,
-                    options.split,
-                    views=options.views,
-                    mesh=mesh,
-                    baselines=False,
-                    redrawn=redrawn,
-                )
-                figures = _texts(found["drawings"], OF_DRAWINGS) | _texts(found, FIGURES)
-                writer.writerow({"drawn with": part, "reconciled": "yes" if reconciled else "no", **figures})
-                file.flush()
-                sys.stderr.write(f"{part}: {figures}\n")
+    for part in options.part or PARTS:
+        for reconciled in (True, False) if part in POSED else (True,):
+            redrawn = partial(
+                drawn_with, part, level=options.level, size=model.image_size, reconciled=reconciled
+            )
+            found = evaluate(
+                model.network,
+                model.renderer,
+                options.data,
+                options.split,
+                views=options.views,
+                mesh=mesh,
+                baselines=False,
+                redrawn=redrawn,
+            )
+            figures = _texts(found["drawings"], OF_DRAWINGS) | _texts(found, FIGURES)
+            yield {"drawn with": part, "reconciled": "yes" if reconciled else "no", **figures}
 
 
 if __name__ == "__main__":

@@ -6,12 +6,13 @@ Sizes are measured; steps a second and prices of a GPU are assumed, and stand in
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from benchmarks.csv_rows import write_rows
 
 MOST_MEASURED = 100  # characters whose files are looked at
 PAIR_BYTES = 2  # each gradient is sent about twice in a ring
@@ -148,13 +149,8 @@ def main(arguments: Sequence[str]) -> None:
         window=options.window,
         weights_bytes=options.weights.stat().st_size,
     )
-    options.output.mkdir(parents=True, exist_ok=True)
-    with (options.output / "plan.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            [f"{options.characters} characters, {options.gpus} GPUs", "how much", "how it comes about"]
-        )
-        writer.writerows(rows)
+    titles = (f"{options.characters} characters, {options.gpus} GPUs", "how much", "how it comes about")
+    write_rows(options.output / "plan.csv", (dict(zip(titles, row, strict=True)) for row in rows))
 
 
 if __name__ == "__main__":

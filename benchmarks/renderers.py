@@ -6,22 +6,20 @@ Each reads the file by itself. Inner pixels are those that are wholly covered in
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.csv_rows import write_rows
 from charnerf.capture.character import CaptureOptions, capture_character
 from charnerf.capture.renderers.base import AbstractRenderer
 from charnerf.capture.renderers.blender import Blender
 from charnerf.capture.renderers.built_in import BuiltIn
 from charnerf.capture.studio import SUBSAMPLES
 from charnerf.data.characters import CharacterPictures
-from charnerf.files import write_text
 
 VIEWS, SIZE = 2, 128
 MANY = 1024  # rays a pixel: fewer leave noise along edges of colours, of either renderer
@@ -45,20 +43,20 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("meshes", type=Path, nargs="+")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/renderers.csv"))
     given = parser.parse_args(arguments)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    write_rows(given.output, _rows(given.meshes))
+
+
+def _rows(meshes: Sequence[Path]) -> Iterator[dict[str, object]]:
     captures: dict[str, AbstractRenderer] = {
         f"built-in, {SUBSAMPLES} rays": BuiltIn(),
         f"Cycles, {Blender.samples}": Blender(),
         f"Cycles, {MANY}": Blender(samples=MANY),
     }
-    for file in given.meshes:
+    for file in meshes:
         reference = pictures_of(file, BuiltIn(subsamples=MANY, edge_subsamples=MANY))
         for name, renderer in captures.items():
-            writer.writerow((file.stem, name, *differences(reference, pictures_of(file, renderer))))
-    write_text(given.output, text.getvalue())
-    sys.stderr.write(text.getvalue())
+            cells = (file.stem, name, *differences(reference, pictures_of(file, renderer)))
+            yield dict(zip(COLUMNS, cells, strict=True))
 
 
 def pictures_of(file: Path, renderer: AbstractRenderer) -> CharacterPictures:

@@ -8,7 +8,6 @@ or right, and one figure may be 8 % too small.
 from __future__ import annotations
 
 import argparse
-import csv
 import io
 import sys
 from collections import Counter
@@ -21,6 +20,7 @@ from tempfile import NamedTemporaryFile
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from benchmarks.csv_rows import write_rows
 from charnerf.data.characters import Character, load_character
 from charnerf.data.layout import names_of, read_dataset
 from charnerf.drawings.align import on_one_scale
@@ -205,14 +205,7 @@ def main() -> None:
         ("naming", naming([cut for _, _, cut in cuts])),
         ("pages", pages(cuts, options.pages, options.seed)),
     ):
-        _write(options.output / f"{table}.csv", list(rows))
-
-
-def _write(file: Path, rows: Sequence[Mapping[str, object]]) -> None:
-    with file.open("w", newline="", encoding="utf-8") as opened:
-        writer = csv.DictWriter(opened, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+        write_rows(options.output / f"{table}.csv", rows)
 
 
 if __name__ == "__main__":
