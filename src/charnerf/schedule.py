@@ -97,14 +97,7 @@ class PhaseSchedule:
         return len(self.phases)
 
     def index_at(self, *, step: int, seconds: float, progress: float) -> int:
-        """Index of the phase that a step belongs to; arguments as in `phase_at`."""
-        index = 0
-        while self.phases[index].is_over(step=step, seconds=seconds, progress=progress):
-            index += 1
-        return index
-
-    def phase_at(self, *, step: int, seconds: float, progress: float) -> Phase:
-        """Phase that a step belongs to.
+        """Index of the phase that a step belongs to.
 
         Args:
             step: Steps done before this one.
@@ -113,9 +106,12 @@ class PhaseSchedule:
             progress: Share of the budget that is used up before this step, in [0, 1].
 
         Returns:
-            The first phase that has not ended; the last one never does.
+            That of the first phase that has not ended; the last one never does.
         """
-        return self.phases[self.index_at(step=step, seconds=seconds, progress=progress)]
+        index = 0
+        while self.phases[index].is_over(step=step, seconds=seconds, progress=progress):
+            index += 1
+        return index
 
 
 def progress_of_run(

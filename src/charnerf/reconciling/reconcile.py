@@ -28,10 +28,9 @@ class ViewAgreement:
     Attributes:
         partner: Index of the view from the opposite side, whose outline this one's mirrors; None where there is none.
         apart_before: Share of the two outlines' pixels that lie apart by more than a pixel of 128, as drawn; 0 without a
-            partner, as is the next.
-        apart_after: The same once moved, before the outline was taken over.
+            partner.
         iou_before: Of the outlines as drawn; 1 without a partner.
-        iou_after: Once moved.
+        iou_after: Once moved, before the outline was taken over.
         iou_unmirrored: As drawn, without mirroring: larger where a view was traced.
         rows_moved: Largest vertical shift, share of the side.
         is_mended: Whether anything was changed.
@@ -43,7 +42,6 @@ class ViewAgreement:
 
     partner: int | None
     apart_before: float
-    apart_after: float
     iou_before: float
     iou_after: float
     iou_unmirrored: float
@@ -145,7 +143,6 @@ def _agreement(
     return ViewAgreement(
         partner=partner,
         apart_before=share_apart(target, outline),
-        apart_after=share_apart(target, after),
         iou_before=iou(target, outline),
         iou_after=overlap,
         iou_unmirrored=iou(target[:, ::-1], outline),
