@@ -1,7 +1,6 @@
 """`charnerf evaluate`: a model measured on a split."""
 
 import json
-import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -17,7 +16,7 @@ from charnerf.cli.options import Device, SplitName, Trusted, Weights, gathered, 
 from charnerf.cli.summary import STDOUT, Summary, check_json, close
 from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
-from charnerf.files import check_folder, read_text
+from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions
 from charnerf.wording import counted
 
@@ -232,14 +231,13 @@ def _measured_by(run: Path | None) -> tuple[int | Literal["all"], int]:
 
 
 def noted_seconds(run: Path | None) -> float | None:
-    """Training time that a run noted, seconds; None where it noted none, or something else than a number."""
-    if run is None:
-        return None
+    """Training time that a run noted, seconds; None where it noted none, or its metrics can not be read."""
+    from charnerf.reporting.run_files import read_metrics
+
     try:
-        seconds = json.loads(read_text(run / "metrics.json"))["seconds"]["train"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None if run is None else read_metrics(run / "metrics.json")["seconds"].get("train")
+    except DataError:
         return None
-    return seconds if type(seconds) in (int, float) and math.isfinite(seconds) else None
 
 
 def split_of(text: str) -> tuple[Path, str]:
