@@ -15,7 +15,7 @@ MAX_LINES = 400
 MAX_FUNCTION_LINES = 50
 
 FLOORS = (  # from the ground up; a room may import rooms on floors below its own, and no other
-    ("errors", "interruption"),
+    ("errors", "interruption", "wording"),
     (
         "types",
         "checks",
@@ -26,7 +26,6 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
         "markdown",
         "pools",
         "progress",
-        "wording",
     ),
     ("parallel", "pictures", "viewer"),
     ("process",),
