@@ -150,6 +150,20 @@ def test_a_back_that_is_no_mirrored_front_is_warned_of():
     assert any("differ in pose" in one for one in other.warnings)
 
 
+@pytest.mark.parametrize(("pixels", "is_asked"), [(5, False), (20, True)])
+def test_a_traced_back_is_asked_about_where_its_sides_differ_enough(pixels, is_asked):
+    """A pose that is not quite the front's makes some difference too."""
+    figure = np.full((300, 300, 3), 255, np.uint8)
+    figure[40:260, 130:170] = figure[100:115, 70:230] = (60, 70, 160)
+    side, front = figure.copy(), figure.copy()
+    side[100:115] = 255
+    side[100:115, 130:170] = (60, 70, 160)
+    front[115 : 115 + pixels, 80:110] = (60, 70, 160)  # hangs from one arm
+    back = np.where(front < 255, (90, 160, 60), 255).astype(np.uint8)
+    read = read_turnaround(front, side, back, size=SIZE)
+    assert any("better unmirrored" in one for one in read.warnings) == is_asked
+
+
 def test_on_the_page_sentences_name_buttons_and_no_options():
     front, side, back = _arrays(paint(view) for view in VIEWS)
     with worded_for_page():
