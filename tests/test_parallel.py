@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import torch
 
 from charnerf.errors import DataError
 from charnerf.interruption import Stopped
@@ -31,6 +32,35 @@ def die(number: int) -> None:
 def test_each_item_comes_with_its_result(processes: int, tmp_path: Path) -> None:
     with in_processes(partial(begin, folder=tmp_path), range(5), processes) as results:
         assert sorted(results) == [(number, number) for number in range(5)]
+
+
+def threads(_: int) -> tuple[int, str]:
+    return torch.get_num_threads(), os.environ["OMP_NUM_THREADS"]
+
+
+def test_processes_use_one_thread_of_torch_and_of_what_is_loaded_later() -> None:
+    with in_processes(threads, range(2), 2) as results:
+        assert [found for _, found in results] == [(1, "1")] * 2
+
+
+def test_what_processes_need_is_imported_before_one_is_started(tmp_path: Path) -> None:
+    (tmp_path / "probe.py").write_text(
+        "from pathlib import Path\nPath(__file__).with_name('imported').touch()\n"
+    )
+    code = """
+    import os, sys, time
+    from pathlib import Path
+    from charnerf.pools import import_aside
+    os.cpu_count = lambda: 2
+    import_aside("probe")
+    end = time.monotonic() + 20.0
+    while not Path(sys.argv[1], "imported").exists() and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not {"probe", "torch"} & set(sys.modules)
+    """
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", textwrap.dedent(code), str(tmp_path)], check=True, env=environment)
+    assert (tmp_path / "imported").exists()
 
 
 @pytest.mark.parametrize("error", [DataError("the caller's"), Stopped(15), None])

@@ -70,5 +70,6 @@ def _do(work: Callable[[Item], Result], item: Item) -> Result:
 def _begin(_: Connection) -> None:
     """Use one thread, leave Ctrl-C to the parent, and end with that even if it is killed."""
     torch.set_num_threads(1)
+    os.environ["OMP_NUM_THREADS"] = "1"  # of libraries that are loaded from now on
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()

@@ -18,6 +18,7 @@ from charnerf.drawings.options import ReadingOptions
 from charnerf.errors import ConfigError, DataError
 from charnerf.files import check_folder
 from charnerf.meshing.options import MeshOptions
+from charnerf.pools import import_aside
 from charnerf.wording import counted
 
 if TYPE_CHECKING:
@@ -122,13 +123,15 @@ def command(
 ) -> None:
     """Measure a model on a split: PSNR, SSIM, LPIPS, FLIP, IoU, Chamfer, F-score, by angle, with seconds. Prints metrics.json."""
     began, num_views = time.perf_counter(), _number_of_views(views)
+    _check(output, json_file, resolution)
+    if jobs != 1 and device in ("auto", "cpu"):
+        import_aside("charnerf.evaluation.side_by_side")
     from charnerf.evaluation.evaluate import evaluate
     from charnerf.evaluation.nearest import TrainingCharacters
     from charnerf.inference.weights import run_folder
     from charnerf.meshing.build import find_surface
 
     source_drawer = _source_drawer(drawn, sources, reading)
-    _check(output, json_file, resolution)
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
     run = run_folder(model.source)
     run_views, run_resolution = _measured_by(run)

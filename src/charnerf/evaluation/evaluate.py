@@ -73,8 +73,9 @@ def evaluate(
     names = names_of(read_dataset(root), split)[share.process :: share.processes]
     processes = processes or processes_worth(len(names), network.device)
     measure = partial(_measured, of_one, Path(root), redrawn, views, output)
+    cost = partial(_figure_pixels, Path(root))
     with Progress(f"evaluate {split}") as progress:
-        results = _of_all(_every(measure, names, processes, progress), share)
+        results = _of_all(_every(measure, names, processes, cost, progress), share)
     if output is not None and share.process == 0:
         write_views(output / VIEWS_FILE, results)
     return split_metrics(
@@ -83,13 +84,22 @@ def evaluate(
 
 
 def _every(
-    measure: Callable[..., CharacterResult], names: Sequence[str], processes: int, progress: Progress
+    measure: Callable[..., CharacterResult],
+    names: Sequence[str],
+    processes: int,
+    cost: Callable[[str], float],
+    progress: Progress,
 ) -> list[CharacterResult]:
     """Measure characters by name, here one by one or in several processes."""
     if min(processes, len(names)) > 1:
-        return measured_side_by_side(measure, names, processes, progress.update)
+        return measured_side_by_side(measure, names, processes, cost=cost, on_share=progress.update)
     counters = [partial(progress.counter, of=(place, len(names))) for place in range(len(names))]
     return [measure(name, counter=counter) for name, counter in zip(names, counters, strict=True)]
+
+
+def _figure_pixels(root: Path, name: str) -> float:
+    """Pixels of a character in its drawings, which most of the work on it goes with."""
+    return float(load_character(root, name).sources.images[:, :, 3].sum())
 
 
 def _uncounted(total: int) -> Callable[[], None]:
