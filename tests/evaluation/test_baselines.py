@@ -1,8 +1,17 @@
+import math
+from dataclasses import replace
+
 import pytest
 import torch
 
-from charnerf.evaluation import metrics
-from charnerf.evaluation.baselines import VisualHullBaseline, signed_edge_distances, white_prediction
+from charnerf.evaluation import baselines, metrics
+from charnerf.evaluation.baselines import (
+    VisualHullBaseline,
+    grid_field,
+    hull_field,
+    signed_edge_distances,
+    white_prediction,
+)
 from charnerf.evaluation.surface_error import seen_points, surface_scores
 from charnerf.pictures import on_white
 from charnerf.surfaces.raycast import RayCaster
@@ -81,6 +90,28 @@ def test_a_box_is_its_own_hull():
     assert reasons == {}
     assert scores["chamfer_mm"] < 10.0  # a pixel is 46 mm
     assert scores["f_score"] > 0.97
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 0.3])
+def test_a_grid_has_the_fields_of_its_points(turned_deg, monkeypatch):
+    """Whether views look along its axes or not; of one that does a single layer is asked."""
+    views = source_views(figure("doll"))
+    c, s = math.cos(math.radians(turned_deg)), math.sin(math.radians(turned_deg))
+    turned = torch.eye(4)
+    turned[:2, :2] = torch.tensor([[c, -s], [s, c]])
+    cameras = replace(views.cameras[0], world_from_camera=turned @ views.cameras.world_from_camera[0])
+    distances = signed_edge_distances(views.images[0, :, 3])
+    low, cell, counts = torch.tensor((-1.0, -0.6, -0.1)), 0.1, (20, 13, 23)
+    steps = torch.cartesian_prod(*map(torch.arange, counts))
+    expected = hull_field(cameras, distances, low + cell * steps).view(counts)
+    asked = []
+    monkeypatch.setattr(
+        baselines, "hull_field", lambda *given: asked.append(len(given[2])) or hull_field(*given)
+    )
+    found = grid_field(cameras, distances, low, cell, counts)
+    torch.testing.assert_close(found, expected, atol=1e-5, rtol=0.0)
+    layers = [20 * 23, 13 * 23, 20 * 23]
+    assert asked == (layers if turned_deg == 0.0 else [math.prod(counts)] * 3)
 
 
 def test_contradicting_drawings_have_no_hull_and_draw_white():

@@ -21,6 +21,7 @@ from charnerf.types import Cameras, RenderOutput, SourceViews
 _COARSE_CELL = 0.06
 _FINE_CELL = 0.012
 _MAX_CELLS = 3_000_000
+_ASIDE = 1e-6  # of a direction: what is no more aside goes along an axis, micrometres off at the far end
 _POINTS_AT_ONCE = 65_536  # 3 MiB a tensor; all at once would take 500 MiB
 
 
@@ -83,6 +84,37 @@ def _in_chunks(cameras: Cameras, edge_distances: Tensor, points: Tensor) -> Tens
     return torch.cat([hull_field(cameras, edge_distances, part) for part in points.split(_POINTS_AT_ONCE)])
 
 
+def grid_field(
+    cameras: Cameras, edge_distances: Tensor, low: Tensor, cell: float, counts: tuple[int, int, int]
+) -> Tensor:
+    """`hull_field` of all points low + cell * index of a grid, (counts): of a view along one of its axes one layer says all.
+
+    Args:
+        cameras: The views' cameras, (V,).
+        edge_distances: (V, H, W), pixels, positive inside.
+        low: The grid's first point, (3,), m.
+        cell: m.
+        counts: Points along the axes.
+    """
+    ends = torch.stack((low, low + cell * (torch.tensor(counts) - 1)))
+    field = torch.full(counts, torch.inf)
+    for view in range(len(edge_distances)):
+        along = _axis_along(cameras[view], ends)
+        x, y, z = (1 if axis == along else count for axis, count in enumerate(counts))
+        one = slice(view, view + 1)
+        values = _in_chunks(cameras[one], edge_distances[one], _grid_points(low, cell, (x, y, z)))
+        field = torch.minimum(field, values.view(x, y, z))
+    return field
+
+
+def _axis_along(camera: Cameras, ends: Tensor) -> int | None:
+    """Axis along which an orthographic camera of shape () looks at a box of corners (2, 3), which is all before it; else None."""
+    shares, axes = camera.world_from_camera[:3, 2].abs().sort(descending=True)
+    in_front = project(camera, ends)[2]
+    alike = bool(camera.orthographic) and float(shares[1]) < _ASIDE and bool(in_front.all())
+    return int(axes[0]) if alike else None
+
+
 def _grid_points(low: Tensor, cell: float, counts: tuple[int, int, int]) -> Tensor:
     """Points of a grid, (prod(counts), 3)."""
     axes = [low[axis] + cell * torch.arange(counts[axis]) for axis in range(3)]
@@ -93,8 +125,9 @@ def carve(cameras: Cameras, edge_distances: Tensor) -> trimesh.Trimesh | None:
     """Mesh of the visual hull of views (V,) with signed edge distances (V, H, W); None if it is empty."""
     centre = torch.tensor(CENTRE)
     count = 1 + int(2 * BOX_HALF_EXTENT / _COARSE_CELL)
-    coarse = _grid_points(centre - BOX_HALF_EXTENT, _COARSE_CELL, (count, count, count))
-    near = _in_chunks(cameras, edge_distances, coarse) > -_COARSE_CELL
+    shape = (count, count, count)
+    coarse = _grid_points(centre - BOX_HALF_EXTENT, _COARSE_CELL, shape)
+    near = grid_field(cameras, edge_distances, coarse[0], _COARSE_CELL, shape).reshape(-1) > -_COARSE_CELL
     if not bool(near.any()):
         return None
     low = coarse[near].amin(0) - _COARSE_CELL
@@ -102,7 +135,7 @@ def carve(cameras: Cameras, edge_distances: Tensor) -> trimesh.Trimesh | None:
     cell = max(_FINE_CELL, float(extent.prod() / _MAX_CELLS) ** (1 / 3))
     counts = tuple(int(side / cell) + 2 for side in extent.tolist())
     assert len(counts) == 3
-    field = _in_chunks(cameras, edge_distances, _grid_points(low, cell, counts)).reshape(counts)
+    field = grid_field(cameras, edge_distances, low, cell, counts)
     solid = np.pad(field.numpy(), 1, constant_values=-cell)
     if not (solid > 0.0).any():
         return None
