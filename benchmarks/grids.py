@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 from charnerf.bench.subjects import Subject
 from charnerf.meshing.extract import extract_surface
 from charnerf.meshing.grid_sampler import GridSampler
-from charnerf.meshing.level import choose_level
+from charnerf.meshing.optical_depth import SURFACE
 
 CUBE_SIDE = 2.2  # m
-SAME_DISTANCE = 1e-4  # m, between two surfaces that count as one
 
 
 @dataclass(frozen=True)
@@ -25,14 +24,12 @@ class GridShare:
     Attributes:
         share: Distinct grid points evaluated over (cells + 1)^3.
         all_share: Points that are evaluated when all inside the hull are.
-        same: Whether the two meshes are one.
         distance: Largest distance between their vertices' sets, m; 0 where faces are equal.
         seconds: Of the sparse grid with its surface; and of the full one.
     """
 
     share: float
     all_share: float
-    same: bool
     distance: float
     seconds: float
     all_seconds: float
@@ -51,12 +48,10 @@ def grid_share(subject: Subject, *, cells: int, num_cameras: int) -> GridShare:
     """
     start = time.perf_counter()
     sparse = grid_sampler(subject, cells, num_cameras)
-    level = choose_level(sparse.evaluate_coarse(4), subject.views).chosen.level
-    grid = sparse.evaluate_surface(level)
-    mesh = extract_surface(grid, level).mesh
+    mesh = extract_surface(sparse.evaluate_surface(SURFACE), SURFACE).mesh
     middle = time.perf_counter()
     full = grid_sampler(subject, cells, num_cameras)
-    other = extract_surface(full.evaluate_all(), level).mesh
+    other = extract_surface(full.evaluate_all(), SURFACE).mesh
     end = time.perf_counter()
     equal = mesh.faces.shape == other.faces.shape and bool(np.array_equal(mesh.faces, other.faces))
     distance = 0.0 if equal and np.allclose(mesh.vertices, other.vertices) else hausdorff(mesh, other)
@@ -64,7 +59,6 @@ def grid_share(subject: Subject, *, cells: int, num_cameras: int) -> GridShare:
     return GridShare(
         share=sparse.num_evaluated / total,
         all_share=full.num_evaluated / total,
-        same=distance < SAME_DISTANCE,
         distance=distance,
         seconds=middle - start,
         all_seconds=end - middle,

@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.grids import grid_sampler, hausdorff
 from charnerf.bench.subjects import Subject
 from charnerf.meshing.extract import extract_surface
-from charnerf.meshing.level import choose_level
+from charnerf.meshing.optical_depth import SURFACE
 
 RESOLUTIONS = (64, 96, 128, 192)
 FINEST = 256
@@ -18,8 +18,7 @@ CAMERAS = (1, 4, 8)
 def mesh_rows(subject: Subject) -> list[dict[str, Any]]:
     """Seconds, points and the largest distance to the surface of the finest grid, m."""
     finest = grid_sampler(subject, FINEST, 8)
-    level = choose_level(finest.evaluate_coarse(4), subject.views).chosen.level
-    truth = extract_surface(finest.evaluate_surface(level), level).mesh
+    truth = extract_surface(finest.evaluate_surface(SURFACE), SURFACE).mesh
     cameras = CAMERAS if subject.scene.field.sees_directions else CAMERAS[-1:]
     rows = []
     for resolution in RESOLUTIONS:
@@ -27,8 +26,8 @@ def mesh_rows(subject: Subject) -> list[dict[str, Any]]:
             for name in ("sparse", "full"):
                 start = time.perf_counter()
                 sampler = grid_sampler(subject, resolution, count)
-                grid = sampler.evaluate_surface(level) if name == "sparse" else sampler.evaluate_all()
-                mesh = extract_surface(grid, level).mesh
+                grid = sampler.evaluate_surface(SURFACE) if name == "sparse" else sampler.evaluate_all()
+                mesh = extract_surface(grid, SURFACE).mesh
                 seconds = time.perf_counter() - start
                 rows.append(
                     {

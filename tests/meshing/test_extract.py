@@ -1,4 +1,4 @@
-"""Surfaces: exactness on a sphere, floaters, decimation, the choice of the level."""
+"""Surfaces: exactness on a sphere, floaters, decimation."""
 
 import numpy as np
 import pytest
@@ -8,39 +8,46 @@ import trimesh
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import cameras_towards, direction_from_angles
 from charnerf.meshing.build import build_mesh
-from charnerf.meshing.density_grid import DensityGrid
 from charnerf.meshing.extract import drop_floaters, extract_surface, fit_height, simplify
+from charnerf.meshing.grid import Grid
 from charnerf.meshing.grid_sampler import GridSampler
-from charnerf.meshing.level import LEVELS, choose_level
+from charnerf.meshing.optical_depth import AHEAD, SURFACE
 from charnerf.meshing.options import MeshOptions
 from charnerf.types import LeftOut, SourceViews
-from support.analytic_scenes import capsule, figure, scene_of, sphere, with_field
+from support.analytic_scenes import capsule, figure, scene_of, sphere
 
 CENTRE = np.array([0.03, -0.07, 1.02])
 
 
-def _sphere_mesh(resolution: int, refine: bool, width: float = 0.03) -> trimesh.Trimesh:
+def _sphere_mesh(resolution: int, width: float = 0.03) -> trimesh.Trimesh:
     sampler = GridSampler(scene_of(sphere, width=width), resolution=resolution, num_cameras=1)
-    grid = sampler.evaluate_surface(100.0)
-    return extract_surface(grid, 100.0, density_at=sampler.density_at if refine else None).mesh
+    return extract_surface(sampler.evaluate_surface(SURFACE), SURFACE).mesh
 
 
-def test_sphere_is_exact_below_the_cell():
-    mesh = _sphere_mesh(128, refine=True)
+def test_a_sphere_is_found_below_the_cell():
+    """The density is sigmoid(4 (1 - r) / 0.03) 200/m, whose integral over r has a closed form."""
+    mesh = _sphere_mesh(128)
     radii = np.linalg.norm(mesh.vertices - CENTRE, axis=1)
-    assert np.abs(radii - 1.0).max() < 1e-3  # every vertex; a cell is 2.2e-2
-    np.testing.assert_allclose(mesh.vertices.min(0) + mesh.vertices.max(0), 2 * CENTRE, atol=1e-3)
-    assert mesh.volume == pytest.approx(4 / 3 * np.pi, rel=1e-3)
+    r = np.linspace(0.9, 1.1, 20001)
+    inward = 4.0 * (1.0 - r) / 0.03
+    values = 200.0 * 0.03 / 4.0 * np.logaddexp(0.0, inward) + AHEAD * 200.0 / (1.0 + np.exp(-inward))
+    expected = r[values >= SURFACE].max()
+    assert np.abs(radii - expected).max() < 6e-3  # every vertex; a cell is 2.2e-2
+    np.testing.assert_allclose(mesh.vertices.min(0) + mesh.vertices.max(0), 2 * CENTRE, atol=5e-3)
+    assert mesh.volume == pytest.approx(4 / 3 * np.pi * expected**3, rel=1e-2)
     assert mesh.is_watertight and mesh.euler_number == 2
     outward = ((mesh.triangles_center - CENTRE) * mesh.face_normals).sum(1)
     assert (outward > 0).all()
 
 
-def test_interpolated_sphere_converges_with_second_order():
-    """Without the secant steps the volume's error falls with the square of the cell."""
-    errors = [abs(_sphere_mesh(n, refine=False, width=1.0).volume - 4 / 3 * np.pi) for n in (24, 48, 96)]
-    slope = np.polyfit(np.log([24, 48, 96]), np.log(errors), 1)[0]
-    assert slope == pytest.approx(-2.0, abs=0.3)
+def test_a_sphere_converges_with_second_order():
+    """The volume's error falls with the square of the cell, towards that of a fine grid."""
+    sizes = (24, 48, 96)
+    finest = _sphere_mesh(288, width=0.25).volume
+    slope = np.polyfit(
+        np.log(sizes), np.log([abs(_sphere_mesh(n, width=0.25).volume - finest) for n in sizes]), 1
+    )[0]
+    assert slope == pytest.approx(-2.0, abs=0.4)
 
 
 def _ball(radius: float, x: float) -> trimesh.Trimesh:
@@ -61,10 +68,10 @@ def test_floaters_go_and_held_props_stay():
 
 
 def test_empty_field_says_its_range():
-    grid = DensityGrid(np.full((8, 8, 8), 0.25, np.float32), np.zeros(3), 0.1, LeftOut())
-    with pytest.raises(NumericalError, match=r"found densities from 0.25 to 0.25 1/m.*above the level 15"):
+    grid = Grid(np.full((8, 8, 8), 0.25, np.float32), np.zeros(3), 0.1, LeftOut())
+    with pytest.raises(NumericalError, match=r"found values from 0.25 to 0.25.*above the surface's 15"):
         extract_surface(grid, 15.0)
-    with pytest.raises(NumericalError, match=r"found densities from 0 to 0.*no ray loses half"):
+    with pytest.raises(NumericalError, match=r"found values from 0 to 0.*The field is empty"):
         build_mesh(scene_of(sphere, peak=0.0), None, MeshOptions(resolution=32))
     with pytest.raises(DataError, match="level: found -1"):
         extract_surface(grid, -1.0)
@@ -109,36 +116,6 @@ def _views_of(distance, size: int = 96) -> SourceViews:
         images[0, v, 3] = (distance(points) > 0).reshape(size, size, 60).any(-1).float()
     flags = torch.zeros(1, 3, dtype=torch.bool)
     return SourceViews(images, cameras[None], ~flags, flags)
-
-
-def test_level_is_where_rendering_sees_the_surface():
-    """Haze around a figure: the level keeps it out, at any scale of the densities."""
-    for scale in (1.0, 0.3):
-        scene = scene_of(figure, width=0.04, peak=200.0 * scale)
-
-        def with_haze(points, view_dirs, field=scene.field, factor=scale):
-            output = field(points, view_dirs)
-            return type(output)(output.rgb, output.densities + factor * (figure(points) > -0.1))
-
-        scene = with_field(scene, with_haze)
-        grid = GridSampler(scene, resolution=64, num_cameras=1).evaluate_all()
-        choice = choose_level(grid, _views_of(figure))
-        assert 2.0 * scale < choice.chosen.level < 100.0 * scale
-        assert choice.chosen.depth_error < 0.03
-        assert choice.chosen.mask_iou > 0.8
-        assert len(choice.tried) == len(LEVELS)
-
-
-def test_level_of_a_slab_is_the_density_where_half_of_the_light_is_gone():
-    """Density a * x at depth x below the surface: half is gone at x = sqrt(2 ln 2 / a)."""
-    slope = 3000.0
-    axis = np.arange(97) * 0.01
-    depth = np.minimum(axis, axis[::-1])
-    block = np.minimum(np.minimum(depth[:, None, None], depth[None, :, None]), depth[None, None, :])
-    grid = DensityGrid((slope * block).astype(np.float32), np.zeros(3), 0.01, LeftOut())
-    half_gone = np.sqrt(2.0 * np.log(2.0) * slope)  # 1/m, along the normal; slanted rays go less deep
-    level = choose_level(grid, None).chosen.level
-    assert 0.45 * half_gone < level < 1.1 * half_gone
 
 
 def test_built_mesh_is_colored_and_of_the_asked_size():

@@ -11,6 +11,7 @@ from charnerf.meshing.extract import extract_surface
 from charnerf.meshing.grid_sampler import GridSampler
 from charnerf.meshing.lod import num_parts
 from charnerf.meshing.loose import find_parts, join, without
+from charnerf.meshing.optical_depth import SURFACE
 from charnerf.meshing.options import MeshOptions
 from charnerf.scene import Scene
 from charnerf.surfaces.render import render_mesh
@@ -18,7 +19,6 @@ from charnerf.types import FieldOutput, SourceViews
 from support import helpers
 from support.analytic_scenes import capsule, figure, scene_of, with_field
 
-LEVEL = 20.0
 OPTIONS = MeshOptions(resolution=64, height=None)
 WRIST = ((0.42, 0.0, 1.45), (0.5, 0.0, 1.45))  # between them the left arm is thin
 
@@ -43,46 +43,50 @@ def scene(*, wrist: float = 1.0, ghost: bool = False) -> Scene:
 def drawings() -> SourceViews:
     """The whole figure as front, side and back drawing, from its own mesh."""
     cameras = helpers.source_cameras(size=128)
-    mesh = build_mesh(scene(), None, OPTIONS, level=LEVEL).mesh
+    mesh = build_mesh(scene(), None, OPTIONS).mesh
     pictures = torch.from_numpy(render_mesh(mesh, cameras)).movedim(-1, 1)[None].float()
     flags = torch.zeros(1, len(pictures[0]), dtype=torch.bool)
     return SourceViews(images=pictures, cameras=cameras[None], present=~flags, mirrored=flags)
 
 
 def test_a_hand_is_joined_through_the_thin_wrist_and_nothing_else_changes(drawings):
-    sampler = GridSampler(scene(wrist=0.05), resolution=OPTIONS.resolution, num_cameras=1)
-    grid = sampler.evaluate_surface(LEVEL)
-    parts, before = find_parts(grid, LEVEL, drawings), sampler.values.copy()
+    grid = GridSampler(scene(wrist=0.01), resolution=OPTIONS.resolution, num_cameras=1).evaluate_surface(
+        SURFACE
+    )
+    parts = find_parts(grid, SURFACE, drawings)
     assert len(parts.needed) == 1 and not parts.unneeded
-    assert join(sampler, parts, LEVEL) == 1
-    assert num_labels(sampler.evaluate_surface(LEVEL), drawings) == 1
-    x = sampler.origin[0] + sampler.spacing * np.argwhere(sampler.values != before)[:, 0]
+    after, joined = join(grid, parts, SURFACE)
+    assert joined == 1 and num_labels(after, drawings) == 1
+    x = grid.origin[0] + grid.spacing * np.argwhere(after.values != grid.values)[:, 0]
     assert len(x) > 0 and x.min() > WRIST[0][0] - 0.1 and x.max() < WRIST[1][0] + 0.1
 
 
 def test_a_hand_drawn_apart_stays_apart(drawings):
-    sampler = GridSampler(scene(wrist=0.0), resolution=OPTIONS.resolution, num_cameras=1)
-    grid = sampler.evaluate_surface(LEVEL)
-    parts = find_parts(grid, LEVEL, drawings)
-    assert len(parts.needed) == 1 and join(sampler, parts, LEVEL) == 0
+    grid = GridSampler(scene(wrist=0.0), resolution=OPTIONS.resolution, num_cameras=1).evaluate_surface(
+        SURFACE
+    )
+    parts = find_parts(grid, SURFACE, drawings)
+    assert len(parts.needed) == 1 and join(grid, parts, SURFACE)[1] == 0
     assert without(grid, parts) is grid
 
 
 def test_a_blob_that_no_drawing_shows_is_left_out_and_counted(drawings):
     """It lies before the chest, as seen from the front, and outside of what the side shows."""
     clean, haunted = (
-        GridSampler(scene(ghost=one), resolution=OPTIONS.resolution, num_cameras=1).evaluate_surface(LEVEL)
+        GridSampler(scene(ghost=one), resolution=OPTIONS.resolution, num_cameras=1).evaluate_surface(SURFACE)
         for one in (False, True)
     )
-    parts = find_parts(haunted, LEVEL, drawings)
+    parts = find_parts(haunted, SURFACE, drawings)
     assert not parts.needed and len(parts.unneeded) == 1
-    meshes = [extract_surface(one, LEVEL).mesh for one in (clean, haunted, without(haunted, parts))]
+    meshes = [extract_surface(one, SURFACE).mesh for one in (clean, haunted, without(haunted, parts))]
     assert [num_parts(one) for one in meshes] == [1, 2, 1]
-    np.testing.assert_array_equal(meshes[2].vertices, meshes[0].vertices)
-    found = find_surface(scene(ghost=True), drawings, OPTIONS, level=LEVEL)
+    np.testing.assert_allclose(
+        meshes[2].vertices, meshes[0].vertices, atol=2e-3
+    )  # the blob shades the chest behind it
+    found = find_surface(scene(ghost=True), drawings, OPTIONS)
     assert found.num_unneeded == num_parts(found.extraction.mesh) == 1
 
 
 def num_labels(grid, drawings: SourceViews) -> int:
-    parts = find_parts(grid, LEVEL, drawings)
+    parts = find_parts(grid, SURFACE, drawings)
     return 1 + len(parts.needed) + len(parts.unneeded)

@@ -76,7 +76,7 @@ def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
         "floor line",
         "left side",
         "grid's points were left out",
-        "| density |",
+        "% of the light is gone on the clearest way in; Euler number",
         "| encode |",
         "weights.safet",
     ):

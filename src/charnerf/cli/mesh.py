@@ -74,7 +74,7 @@ Convergence = Annotated[
     bool,
     typer.Option(
         "--convergence",
-        help="Also measure how many cameras are needed, and show levels beside the chosen one: DIR/NAME_cameras.md.",
+        help="Also measure how many cameras are needed: DIR/NAME_cameras.md.",
     ),
 ]
 Format = Annotated[
@@ -163,7 +163,7 @@ def command(
     for one, hero in heroes:
         folder = output if split is None else output / one.name
         files = _write(hero, one.name, folder, options, plan, suffix, json_file)
-        notes = files.notes + (_converged(hero, one.name, folder, files) if convergence else ())
+        notes = files.notes + (_converged(hero, one.name, folder) if convergence else ())
         for line in notes if split is None else notes[:1]:
             say(line)
         written += [*files.meshes, files.sheet]
@@ -207,11 +207,11 @@ def _write(
     return files
 
 
-def _converged(hero: "Hero", name: str, folder: Path, files: "MeshFiles") -> tuple[str, ...]:
+def _converged(hero: "Hero", name: str, folder: Path) -> tuple[str, ...]:
     """Lines of how many cameras a mesh needs."""
     from charnerf.reconstruction.meshes import write_convergence
 
-    return write_convergence(hero, name, folder, files.built)
+    return write_convergence(hero, name, folder)
 
 
 def _heroes(

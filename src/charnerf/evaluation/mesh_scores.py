@@ -56,7 +56,7 @@ def score_meshes(scene: Scene, character: Character, options: MeshOptions) -> di
         "novel": (character.cameras[indices], character.images(indices) / 255.0),
     }
     surface = find_surface(scene, sources, options)
-    result: dict[str, Any] = {"surface_seconds": surface.seconds, "level": surface.extraction.level}
+    result: dict[str, Any] = {"surface_seconds": surface.seconds}
     for kind in KINDS:
         start = time.perf_counter()
         built = finish_mesh(scene, surface, sources, replace(options, texture=kind, height=None))

@@ -5,17 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import trimesh
 
 from charnerf.meshing.extract import Extraction, extract_surface, fit_height, simplify
 from charnerf.meshing.field_colors import color_vertices
 from charnerf.meshing.grid_sampler import GridSampler
-from charnerf.meshing.level import LevelChoice, choose_level
 from charnerf.meshing.loose import tidied
+from charnerf.meshing.optical_depth import SURFACE
 from charnerf.meshing.options import MeshOptions
-from charnerf.meshing.outlines import gain_at, raised_rays
+from charnerf.meshing.outlines import covering
 from charnerf.meshing.smooth import smooth_mesh
 from charnerf.meshing.texture import Textured, texture_mesh
 from charnerf.scene import Scene
@@ -28,8 +27,7 @@ class FoundSurface:
 
     Attributes:
         extraction: The surface and what was removed from it.
-        choice: The evidence for its level; None where the caller gave it.
-        missed: Share of the drawings' pixels of the figure that this level met no surface at, until densities were raised there.
+        missed: Share of the drawings' pixels of the figure that met no surface, until optical depths were raised there.
         num_joined: Loose parts that were joined to the figure.
         num_unneeded: Loose parts that were left out because no drawing needs them.
         left_out: Grid points not evaluated.
@@ -37,7 +35,6 @@ class FoundSurface:
     """
 
     extraction: Extraction
-    choice: LevelChoice | None
     missed: float
     num_joined: int
     num_unneeded: int
@@ -64,18 +61,8 @@ class BuiltMesh:
     seconds: float
 
     @property
-    def level(self) -> float:
-        """Density of the surface, 1/m."""
-        return self.found.extraction.level
-
-    @property
-    def choice(self) -> LevelChoice | None:
-        """The evidence for the level; None where the caller gave it."""
-        return self.found.choice
-
-    @property
     def missed(self) -> float:
-        """Share of the drawings' pixels of the figure whose densities were raised to the level (see outlines.py)."""
+        """Share of the drawings' pixels of the figure whose optical depths were raised (see outlines.py)."""
         return self.found.missed
 
     @property
@@ -105,24 +92,22 @@ def build_mesh(
     options: MeshOptions,
     *,
     detailed: SourceViews | None = None,
-    level: float | None = None,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> BuiltMesh:
     """Make a mesh of a character's field.
 
     Args:
         scene: One character's field.
-        views: Its drawings (B = 1): densities are raised where the surface would miss their silhouettes; None has none.
+        views: Its drawings (B = 1): optical depths are raised where the surface would miss their silhouettes; None has none.
         options: How it is made.
         detailed: The drawings with more pixels, for a texture; `views` themselves if None.
-        level: Density of the surface, 1/m; None chooses it by rendered depths.
         on_points: Called with the number of grid points after each piece of work.
 
     Raises:
-        DataError: If the level is not positive, the hull empty, or there are too many faces for a texture.
+        DataError: If the hull is empty, or there are too many faces for a texture.
         NumericalError: If the field is empty or not finite.
     """
-    found = find_surface(scene, views, options, level=level, on_points=on_points)
+    found = find_surface(scene, views, options, on_points=on_points)
     return finish_mesh(scene, found, views if detailed is None else detailed, options)
 
 
@@ -131,7 +116,6 @@ def find_surface(
     views: SourceViews | None,
     options: MeshOptions,
     *,
-    level: float | None = None,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> FoundSurface:
     """The surface of a field, all of its faces; arguments and errors as of `build_mesh`."""
@@ -139,24 +123,14 @@ def find_surface(
     sampler = GridSampler(
         scene, resolution=options.resolution, num_cameras=options.num_cameras, on_points=on_points
     )
-    choice, raised = None, []
-    coarse = sampler.evaluate_coarse(2 if options.resolution < 192 else 4)
-    if level is None:
-        choice = choose_level(coarse, views)
-        level = choice.chosen.level
+    grid, missed, num_joined, num_unneeded = sampler.evaluate_surface(SURFACE), 0.0, 0, 0
     if views is not None:
-        raised = raised_rays(scene, views, level, coarse)
-        if any(one.num_missed for one in raised):
-            sampler.multiply(partial(gain_at, raised))
-    grid, num_joined, num_unneeded = sampler.evaluate_surface(level), 0, 0
-    if views is not None:
-        grid, num_joined, num_unneeded = tidied(sampler, grid, level, views)
-    extraction = extract_surface(grid, level, density_at=sampler.density_at)
+        grid, missed = covering(grid, views, SURFACE)
+        grid, num_joined, num_unneeded = tidied(grid, SURFACE, views)
+    extraction = extract_surface(grid, SURFACE)
     extraction = replace(extraction, mesh=smooth_mesh(extraction.mesh, options.smooth))
-    missed = sum(one.num_missed for one in raised) / max(1, sum(one.num_pixels for one in raised))
-    return FoundSurface(
-        extraction, choice, missed, num_joined, num_unneeded, grid.left_out, time.perf_counter() - start
-    )
+    seconds = time.perf_counter() - start
+    return FoundSurface(extraction, missed, num_joined, num_unneeded, grid.left_out, seconds)
 
 
 def finish_mesh(

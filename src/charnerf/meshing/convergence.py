@@ -14,13 +14,13 @@ from torch import Tensor
 
 from charnerf.geometry.safe import safe_normalize
 from charnerf.markdown import table
-from charnerf.meshing.density_grid import camera_positions
+from charnerf.meshing.density import camera_positions
 from charnerf.meshing.distance import surface_chamfer_mm
 from charnerf.meshing.extract import extract_surface
 from charnerf.meshing.grid_sampler import GridSampler
-from charnerf.meshing.level import choose_level
+from charnerf.meshing.optical_depth import SURFACE
 from charnerf.scene import AbstractField, DensityOutput, Scene
-from charnerf.types import FieldOutput, SourceViews, TensorRecord
+from charnerf.types import FieldOutput, TensorRecord
 
 COUNTS = (1, 2, 4, 8, 16)
 PROBES = 2_000  # points near the surface where directions are compared
@@ -54,14 +54,12 @@ class Convergence:
 
     Attributes:
         rows: By number; empty where the density sees no direction, since one evaluation then is exact.
-        level: Density of all the surfaces, 1/m.
         spread: Standard deviation of the density over directions by its mean, mean over points near the
             surface.
         exact: Whether the density sees no direction.
     """
 
     rows: tuple[ConvergenceRow, ...]
-    level: float
     spread: float
     exact: bool
 
@@ -91,37 +89,29 @@ class Convergence:
 
 def measure_convergence(
     scene: Scene,
-    views: SourceViews | None,
     *,
     resolution: int = 64,
     counts: Sequence[int] = COUNTS,
-    level: float | None = None,
 ) -> Convergence:
     """Make a character's surface by several numbers of cameras and compare.
 
     Args:
         scene: One character's field.
-        views: Its drawings (B = 1), for the choice of the level.
         resolution: Grid points along the longest side.
         counts: Numbers of cameras, ascending; the last one is what the others are compared with.
-        level: Density of the surfaces, 1/m; None chooses it with the most cameras. The same for all, since
-            its effect is larger than that of the cameras.
     """
     most = 1 if not scene.field.sees_directions else max(counts)
-    if level is None:
-        sampler = GridSampler(scene, resolution=resolution, num_cameras=most)
-        level = choose_level(sampler.evaluate_coarse(2), views).chosen.level
-    reference, _ = _surface(scene, resolution, most, level)
+    reference, _ = _surface(scene, resolution, most)
     spread = direction_spread(scene, np.asarray(reference.vertices))
     if not scene.field.sees_directions:
-        return Convergence((), level, spread, True)
+        return Convergence((), spread, True)
     rows = []
     for count in (0, *sorted(counts)):
         seen = scene if count else Scene(_Undirected(scene.field), None, scene.bounds)
-        mesh, seconds = _surface(seen, resolution, max(count, 1), level)
+        mesh, seconds = _surface(seen, resolution, max(count, 1))
         distance = surface_chamfer_mm(mesh, reference)
         rows.append(ConvergenceRow(count, distance, float(mesh.volume), len(mesh.faces), seconds))
-    return Convergence(tuple(rows), level, spread, False)
+    return Convergence(tuple(rows), spread, False)
 
 
 @final
@@ -142,10 +132,10 @@ class _Undirected(AbstractField):
         return self.inner.colors(state)
 
 
-def _surface(scene: Scene, resolution: int, cameras: int, level: float) -> tuple[trimesh.Trimesh, float]:
+def _surface(scene: Scene, resolution: int, cameras: int) -> tuple[trimesh.Trimesh, float]:
     start = time.perf_counter()
     sampler = GridSampler(scene, resolution=resolution, num_cameras=cameras)
-    mesh = extract_surface(sampler.evaluate_surface(level), level, density_at=sampler.density_at).mesh
+    mesh = extract_surface(sampler.evaluate_surface(SURFACE), SURFACE).mesh
     return mesh, time.perf_counter() - start
 
 
@@ -174,7 +164,7 @@ def convergence_lines(result: Convergence) -> list[str]:
             f"{DIRECTIONS} cameras near the surface): one evaluation is exact, whatever number of cameras is asked for.",
             "",
         ]
-    lines += [f"Surfaces at {result.level:.3g} per metre; Chamfer distance to that of the most cameras.", ""]
+    lines += ["Chamfer distance to the surface of the most cameras.", ""]
     rows = []
     for row in result.rows:
         name = f"{row.num_cameras}" if row.num_cameras else "none (zero direction)"

@@ -1,8 +1,7 @@
-"""Surfaces from density grids: marching cubes, floaters, decimation."""
+"""Surfaces from grids: marching cubes, floaters, decimation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import fast_simplification
@@ -12,13 +11,12 @@ from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from charnerf.errors import DataError, NumericalError
-from charnerf.meshing.density_grid import DensityGrid
+from charnerf.meshing.grid import Grid
 from charnerf.meshing.manifold import make_manifold
 
 KEPT_SHARE = 0.01  # of the largest part's area: a part as large as this is kept wherever it is
 KEPT_SPECK = 0.0005  # of the largest part's area: a smaller part is dropped wherever it is
 KEPT_DISTANCE = 0.06  # metres: a part between the two is kept if it is this near to the largest
-SECANT_STEPS = 3
 
 
 @dataclass(frozen=True)
@@ -27,91 +25,42 @@ class Extraction:
 
     Attributes:
         mesh: Closed surface, world frame, metres, normals outward, without colours.
-        level: Density of the surface, 1/m.
         num_floaters: Parts dropped because they are small and far from the figure, or specks.
         num_cavities: Closed holes inside, dropped because nobody sees them.
     """
 
     mesh: trimesh.Trimesh
-    level: float
     num_floaters: int
     num_cavities: int
 
 
-def extract_surface(
-    grid: DensityGrid, level: float, *, density_at: Callable[[np.ndarray], np.ndarray] | None = None
-) -> Extraction:
-    """Surface of constant density by marching cubes.
+def extract_surface(grid: Grid, level: float) -> Extraction:
+    """Surface of a constant value by marching cubes.
 
-    Vertices are placed on the edges of cells by linear interpolation of `density / (density + level)`, which
-    runs almost straight through a surface where the density itself jumps by orders of magnitude, and then
-    moved along their edges to where the density is the level.
+    Vertices lie on the edges of cells by linear interpolation of `Grid.contrast`, which runs almost straight through a
+    surface where values grow by orders of magnitude.
 
     Args:
-        grid: Densities with an empty outermost layer.
-        level: Density of the surface, 1/m.
-        density_at: Densities (P,), 1/m, at points (P, 3), m, for the second step; without it vertices stay
-            interpolated.
+        grid: Optical depths, or densities, 1/m, with an empty outermost layer.
+        level: Value of the surface.
 
     Raises:
         DataError: If the level is not positive.
-        NumericalError: If no density exceeds the level; the message gives the range of the densities.
+        NumericalError: If no value exceeds the level; the message gives the range of the values.
     """
     if not (level > 0 and np.isfinite(level)):
-        raise DataError(f"level: found {level}, expected a positive density in 1/m.")
-    low, high = float(grid.densities.min()), float(grid.densities.max())
+        raise DataError(f"level: found {level}, expected a positive value.")
+    low, high = float(grid.values.min()), float(grid.values.max())
     if not high > level:
         raise NumericalError(
-            f"density grid: found densities from {low:.3g} to {high:.3g} 1/m, expected some above the level "
-            f"{level:.3g} 1/m: there "
-            "is no surface. The field is empty (train longer, or check the drawings' masks) or the level "
-            "too high."
+            f"grid: found values from {low:.3g} to {high:.3g}, expected some above the surface's {level:.3g}: there is no surface. "
+            "The field is empty: train longer, or check the drawings' masks."
         )
-    contrast = _contrast(grid.densities, level)
-    vertices, faces, _, _ = marching_cubes(contrast, 0.0, allow_degenerate=False)
-    if density_at is not None:
-        vertices = _refine(vertices, grid, contrast, level, density_at)
+    vertices, faces, _, _ = marching_cubes(grid.contrast(level), 0.0, allow_degenerate=False)
     # faces of marching_cubes look towards higher values: turn them outward
     mesh = trimesh.Trimesh(grid.origin + vertices * grid.spacing, faces[:, ::-1], process=False)
     kept, floaters, cavities = drop_floaters(mesh)
-    return Extraction(kept, level, floaters, cavities)
-
-
-def _contrast(densities: np.ndarray, level: float) -> np.ndarray:
-    """Densities mapped to [-1, 1], 0 at the level."""
-    densities = np.asarray(densities, np.float64)
-    return (densities - level) / (densities + level)
-
-
-def _refine(
-    vertices: np.ndarray,
-    grid: DensityGrid,
-    contrast: np.ndarray,
-    level: float,
-    density_at: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:
-    """Move vertices (P, 3), in grid units, along their edges to the level (secant method, Illinois form).
-
-    Edges with an end of no density at all stay as they are: they cross the border of the hull's cells, whose
-    stairs are no detail.
-    """
-    below, above = np.floor(vertices), np.ceil(vertices)
-    f_below, f_above = contrast[tuple(below.astype(int).T)], contrast[tuple(above.astype(int).T)]
-    moving = np.flatnonzero((np.minimum(f_below, f_above) > -1.0) & (f_below * f_above < 0))
-    start, edge = below[moving], (above - below)[moving]
-    left, right = np.zeros(len(moving)), np.ones(len(moving))
-    f_left, f_right = f_below[moving].copy(), f_above[moving].copy()
-    share = ((vertices[moving] - start) * edge).sum(-1)
-    for _ in range(SECANT_STEPS):
-        value = _contrast(density_at(grid.origin + (start + share[:, None] * edge) * grid.spacing), level)
-        on_left = value * f_left > 0
-        left, right = np.where(on_left, share, left), np.where(on_left, right, share)
-        f_right = np.where(on_left, 0.5 * f_right, value)
-        f_left = np.where(on_left, value, 0.5 * f_left)
-        share = left + (right - left) * (f_left / (f_left - f_right)).clip(0.01, 0.99)
-    refined = vertices.copy()
-    refined[moving] = start + share[:, None] * edge
-    return refined
+    return Extraction(kept, floaters, cavities)
 
 
 def drop_floaters(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, int, int]:

@@ -1,4 +1,4 @@
-"""A density grid filled where its values can matter, and nowhere else.
+"""Densities on a grid, asked where a surface passes and nowhere else, and the optical depths that they make.
 
 Letters: P points; N cameras averaged over; X, Y, Z grid points along the axes. A cell is the cube between eight grid points; a
 block is a cube of `BLOCK` cells a side and shares its outer points with its neighbours.
@@ -15,17 +15,19 @@ from scipy import ndimage
 from torch import Tensor
 
 from charnerf.errors import DataError
-from charnerf.meshing.density_grid import CHUNK, DensityGrid, averaged_density
+from charnerf.meshing.density import CHUNK, averaged_density
+from charnerf.meshing.grid import Grid
+from charnerf.meshing.optical_depth import surface_values
 from charnerf.scene import Scene
 from charnerf.types import LeftOut
 
 BLOCK = 4  # cells a side
-ACTIVE_SHARE = 0.25  # a block counts as near the surface from this share of the level on
+ACTIVE_SHARE = 0.02  # a block counts as near the surface from this share of its optical depth on: what lies before it adds to that
 
 
 @final
 class GridSampler:
-    """Fills a density grid piece by piece and remembers what was evaluated.
+    """Fills a grid of densities piece by piece and remembers what was evaluated.
 
     The grid covers the occupied part of the hull (the whole box without a hull) with cubic cells,
     `resolution` points along its longest side, and a layer of empty points around, so that every surface in
@@ -54,7 +56,6 @@ class GridSampler:
         if resolution < 16:
             raise DataError(f"resolution: found {resolution} grid points, expected at least 16.")
         self._scene, self._num_cameras, self._on_points = scene, num_cameras, on_points
-        self._gains: list[Callable[[Tensor], Tensor]] = []
         low, high = _occupied_box(scene)
         self.spacing = float((high - low).max()) / (resolution - 3)
         self.origin = low - self.spacing
@@ -89,53 +90,52 @@ class GridSampler:
         index = np.argwhere(wanted & ~self.settled)
         for start in range(0, len(index), CHUNK):
             part = index[start : start + CHUNK]
-            self.values[tuple(part.T)] = self._densities(self._points(part)).cpu().numpy()
+            densities = averaged_density(self._scene, self._points(part), self._num_cameras)
+            self.values[tuple(part.T)] = densities.cpu().numpy()
             self._on_points(len(part))
         self.settled[tuple(index.T)] = True
         self.num_evaluated += len(index)
 
-    def evaluate_all(self) -> DensityGrid:
-        """Evaluate every point inside the hull."""
+    def evaluate_all(self) -> Grid:
+        """Optical depths by every point inside the hull."""
         self.evaluate(np.ones(self.shape, bool))
-        return self._result()
+        return self._depths()
 
-    def evaluate_coarse(self, stride: int) -> DensityGrid:
-        """Evaluate every stride-th point alone and return the grid of these (stride divides BLOCK)."""
+    def evaluate_coarse(self, stride: int) -> Grid:
+        """Evaluate every stride-th point alone and return the densities of these (stride divides BLOCK)."""
         every = (slice(None, None, stride),) * 3
         wanted = np.zeros(self.shape, bool)
         wanted[every] = True
         self.evaluate(wanted)
         values = self.values[every].copy()
         _empty_border(values)
-        return DensityGrid(values, self.origin, self.spacing * stride, self._left_out())
+        return Grid(values, self.origin, self.spacing * stride, self._left_out())
 
-    def evaluate_surface(self, level: float) -> DensityGrid:
-        """Evaluate the blocks that the surface at a level passes through, and no other.
+    def evaluate_surface(self, depth: float) -> Grid:
+        """Optical depths, by the blocks that the surface at a depth passes through and by every second point elsewhere.
 
-        Blocks are found from every second point of the grid where these come near the level, and then along
-        the surface: where it leaves an evaluated block, its neighbour is evaluated too, until it leaves
-        none. Every connected part of the surface that touches one of the first blocks is therefore the same
-        as on the full grid.
+        Blocks are found by the optical depths of every second point, and then along the surface: where it leaves an evaluated
+        block its neighbour is evaluated too, until it leaves none.
 
         Args:
-            level: Density of the surface, 1/m.
+            depth: Optical depth of the surface.
         """
-        self.evaluate_coarse(2)
-        lattice = self.values[::2, ::2, ::2]
+        coarse = self.evaluate_coarse(2)
         half = BLOCK // 2
-        low, high = _block_extremes(lattice, half)
-        active = (high >= ACTIVE_SHARE * level) & (low < level)
+        low, high = _block_extremes(surface_values(coarse.values, coarse.spacing), half)
+        active = (high >= ACTIVE_SHARE * depth) & (low < depth)
         done = np.zeros_like(active)
-        while bool((active & ~done).any()):
+        while True:
             self.evaluate(_points_of_blocks(active & ~done, self.shape))
             done |= active
-            active |= self._entered_from(done, level)
-        self._fill_rest(lattice)
-        return self._result()
+            self._fill_rest(coarse.values)
+            grid = self._depths()
+            active = self._entered_from(done, grid.values > depth)
+            if not bool(active.any()):
+                return grid
 
-    def _entered_from(self, done: np.ndarray, level: float) -> np.ndarray:
-        """Blocks into which the surface leads from evaluated ones: a shared face has points on both sides."""
-        above = self.values > level
+    def _entered_from(self, done: np.ndarray, above: np.ndarray) -> np.ndarray:
+        """Blocks into which the surface leads from evaluated ones: a shared face has points above it and others."""
         entered = np.zeros_like(done)
         for axis in range(3):
             # extremes over the face between block i and i + 1 along the axis
@@ -159,35 +159,13 @@ class GridSampler:
             at = np.argwhere(rest).T / 2.0
             self.values[rest] = ndimage.map_coordinates(lattice, at, order=1, mode="nearest")
 
-    @torch.no_grad()
-    def multiply(self, gain: Callable[[Tensor], Tensor]) -> None:
-        """Multiply all densities, those evaluated so far and those to come, by `gain` of points (P, 3)."""
-        index = np.argwhere(self.values > 0.0)
-        for start in range(0, len(index), CHUNK):
-            part = index[start : start + CHUNK]
-            self.values[tuple(part.T)] *= gain(self._points(part)).cpu().numpy()
-        self._gains.append(gain)
-
-    def _densities(self, points: Tensor) -> Tensor:
-        """Averaged densities (P,) of points (P, 3), multiplied."""
-        densities = averaged_density(self._scene, points, self._num_cameras)
-        for gain in self._gains:
-            densities = densities * gain(points)
-        return densities
-
-    @torch.no_grad()
-    def density_at(self, points: np.ndarray) -> np.ndarray:
-        """Averaged density (P,), 1/m, at any points (P, 3), m."""
-        tensor = torch.from_numpy(points.astype(np.float32)).to(self._scene.bounds.box_min.device)
-        self._on_points(len(points))
-        return self._densities(tensor).double().cpu().numpy()
-
     def _left_out(self) -> LeftOut:
         total = int(np.prod(self.shape))
         return LeftOut(grid_cells=total - self.num_evaluated, grid_cells_of=total)
 
-    def _result(self) -> DensityGrid:
-        return DensityGrid(self.values, self.origin, self.spacing, self._left_out())
+    def _depths(self) -> Grid:
+        depths = surface_values(self.values, self.spacing)
+        return Grid(depths, self.origin, self.spacing, self._left_out())
 
 
 def _occupied_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -70,7 +70,7 @@ def build_lods(
     detailed: SourceViews | None = None,
     on_points: Callable[[int], object] = lambda count: None,
 ) -> tuple[Lod, ...]:
-    """Make meshes of one field at several levels of detail, all of one density level.
+    """Make meshes of one field at several levels of detail.
 
     Args:
         scene: One character's field.
@@ -95,11 +95,11 @@ def build_lods(
     grids = [replace(options, resolution=one, faces=None) for one in sorted(set(resolutions), reverse=True)]
     decimated = [replace(grids[0], faces=count) for count in sorted(set(faces), reverse=True)]
     made: list[tuple[MeshOptions, BuiltMesh, float]] = []
-    level, finest = None, None
+    finest = None
     for grid in grids:
         start = time.perf_counter()
-        found = find_surface(scene, views, grid, level=level, on_points=on_points)
-        level, finest = found.extraction.level, finest or found
+        found = find_surface(scene, views, grid, on_points=on_points)
+        finest = finest or found
         built = finish_mesh(scene, found, drawings, grid)
         made.append((grid, built, time.perf_counter() - start))
     assert finest is not None  # there is a grid

@@ -1,39 +1,37 @@
-"""Parts that a drawing shows and a surface of one level misses: densities raised until the surface covers the drawings' outlines.
+"""Parts that a drawing shows and a surface misses: optical depths raised until the surface covers the drawings' outlines.
 
-Where a field does not know at which depth an ear lies, it spreads a thin density over all depths that it may have: seen through,
-dense enough; nowhere as dense as the surface of a chest. A drawing says that something is there. Along each of its rays that
-shows the figure and meets no surface, densities are multiplied until the densest place does: the likeliest depth.
+Where a field does not know at which depth an ear lies, it spreads a thin density over all depths that it may have: seen through
+from some side. A drawing says that something is there. Along each of its rays that shows the figure and meets no surface, depths
+are multiplied until the deepest place is inside: the likeliest one.
 
-Letters: R rays, S samples on each.
+Letters: R rays, S samples on each; X, Y, Z grid points along the axes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
 from charnerf.geometry.cameras import pixel_rays, project_into_all
 from charnerf.geometry.rays import box_interval, points_along
-from charnerf.meshing.density_grid import DensityGrid
-from charnerf.scene import Scene
+from charnerf.meshing.grid import Grid
 from charnerf.types import Cameras, SourceViews
-from charnerf.volume.marching import densities_inside
 
 MASK_ALPHA = 0.5
-ABOVE = 1.1  # of the level: where the densest place of a ray is brought to; what is 0.91 times as dense is inside then
+ABOVE = 1.1  # of the surface's value: where the deepest place of a ray is brought to; what is 0.91 times as deep is inside then
 MOST = 30.0  # times; what would need more is no part of the figure that the field knows of
-SURE = 2.0  # of the level: a ray that is this dense on the coarse grid meets the surface and is not looked at again
 STEP = 0.012  # m, between samples
-LIKELY = 4  # places of a ray that are looked at first
 RAYS_AT_ONCE = 2048
+POINTS_AT_ONCE = 65536
 
 
 @dataclass(frozen=True)
 class RaisedRays:
-    """By how much densities are multiplied along the rays of one drawing.
+    """By how much values are multiplied along the rays of one drawing.
 
     Attributes:
         camera: The drawing's, (1,).
@@ -49,24 +47,38 @@ class RaisedRays:
 
 
 @torch.no_grad()
-def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityGrid) -> list[RaisedRays]:
-    """Find the rays of drawings that show the figure and meet no surface, and what mends that.
+def covering(grid: Grid, views: SourceViews, level: float) -> tuple[Grid, float]:
+    """Raise values so that the surface covers the drawings.
 
     Args:
-        scene: One character's field.
-        views: Its drawings (B = 1); mirrored ones show nothing that was drawn.
-        level: Density of the surface, 1/m.
-        coarse: Densities of the same field: what is dense there needs no second look.
+        grid: Optical depths.
+        views: The drawings (B = 1); mirrored ones show nothing that was drawn.
+        level: Value of the surface.
 
     Returns:
-        One entry a drawing.
+        The grid anew, and the share of the drawings' pixels of the figure that met no surface before.
     """
+    raised = raised_rays(grid, views, level)
+    missed = sum(one.num_missed for one in raised)
+    if missed:
+        index = np.argwhere(grid.values > 0.0)
+        values = grid.values.copy()
+        for start in range(0, len(index), POINTS_AT_ONCE):
+            part = index[start : start + POINTS_AT_ONCE]
+            points = torch.from_numpy((grid.origin + part * grid.spacing).astype(np.float32))
+            values[tuple(part.T)] *= gain_at(raised, points).numpy()
+        grid = replace(grid, values=values)
+    return grid, missed / max(1, sum(one.num_pixels for one in raised))
+
+
+def raised_rays(grid: Grid, views: SourceViews, level: float) -> list[RaisedRays]:
+    """Find the rays of drawings that show the figure and meet no surface, and what mends that; one entry a drawing."""
     raised = []
     for v in (views.present[0] & ~views.mirrored[0]).nonzero()[:, 0].tolist():
-        camera, alpha = views.cameras[0, v : v + 1], views.images[0, v, 3]
+        camera, alpha = views.cameras[0, v : v + 1].to("cpu"), views.images[0, v, 3].cpu()
         mask = alpha > MASK_ALPHA
         peaks = torch.full_like(alpha, torch.inf)
-        peaks[mask] = _peaks(scene, camera, mask, coarse, level)
+        peaks[mask] = _peaks(grid, camera, mask, level)
         gains = (ABOVE * level / peaks.clamp_min(torch.finfo(peaks.dtype).tiny)).clamp_min(1.0)
         missed = int((peaks < level).sum())
         # a gain of its own for every pixel would leave stairs: the largest around, smoothed
@@ -76,37 +88,27 @@ def raised_rays(scene: Scene, views: SourceViews, level: float, coarse: DensityG
     return raised
 
 
-def _peaks(scene: Scene, camera: Cameras, mask: Tensor, coarse: DensityGrid, level: float) -> Tensor:
-    """Largest density inside the hull along the rays of a mask's pixels (H, W), 1/m: where it is below what needs no gain.
-
-    Elsewhere it is infinite, or that of the places that the coarse grid thinks densest: most rays are settled by those.
-    """
+def _peaks(grid: Grid, camera: Cameras, mask: Tensor, level: float) -> Tensor:
+    """Largest value along the rays (R,) of a mask's pixels (H, W)."""
     y, x = mask.nonzero().unbind(-1)
     rays = pixel_rays(camera[0], torch.stack((x + 0.5, y + 0.5), dim=-1).to(camera.focal.dtype))
-    near, far = box_interval(rays, *scene.bounds.tight_box)
+    corner = torch.from_numpy(grid.origin).to(rays.origins)
+    extent = (torch.tensor(grid.values.shape) - 1).to(rays.origins) * grid.spacing
+    near, far = box_interval(rays, corner, corner + extent)
     if len(near) == 0:
         return near
     num = max(2, int(float((far - near).max()) / STEP))
-    share = (torch.arange(num, dtype=near.dtype, device=near.device) + 0.5) / num
-    coarse_density = coarse.interpolator(near.device)
-    peaks = torch.full_like(near, torch.inf)
-    for part in torch.arange(len(near), device=near.device).split(RAYS_AT_ONCE):
+    share = (torch.arange(num, dtype=near.dtype) + 0.5) / num
+    value_at = grid.interpolator(level)
+    peaks = []
+    for part in torch.arange(len(near)).split(RAYS_AT_ONCE):
         t = near[part, None] + (far - near).clamp_min(0.0)[part, None] * share
-        points = points_along(rays[part], t)
-        expected = coarse_density(points)
-        left = (expected.amax(-1) < SURE * level).nonzero()[:, 0]
-        likely = expected[left].topk(min(LIKELY, num), dim=-1).indices
-        for places in (likely, torch.arange(num, device=near.device).expand(len(left), -1)):
-            asked = points[left].gather(1, places[: len(left), :, None].expand(-1, -1, 3))
-            dirs = rays.directions[part[left], None].expand_as(asked)
-            found = densities_inside(scene.field, asked, dirs, scene.bounds.may_hold(asked)).amax(-1)
-            peaks[part[left]] = found
-            left = left[found < ABOVE * level]
-    return peaks
+        peaks.append(value_at(points_along(rays[part], t)).amax(-1).to(near.dtype))
+    return torch.cat(peaks)
 
 
 def gain_at(raised: list[RaisedRays], points: Tensor) -> Tensor:
-    """By how much densities at points (P, 3) are multiplied, (P,): the largest gain where rays of several drawings meet."""
+    """By how much values at points (P, 3) are multiplied, (P,): the largest gain where rays of several drawings meet."""
     most = points.new_ones(len(points))
     for one in raised:
         pixels = project_into_all(one.camera, points)[0][:, 0]

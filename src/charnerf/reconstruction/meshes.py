@@ -15,7 +15,7 @@ from charnerf.meshing.options import MeshOptions
 from charnerf.meshing.sheet import contact_sheet
 from charnerf.progress import Progress
 from charnerf.reconstruction.progress import mesh_seconds, meter
-from charnerf.reconstruction.report import level_lines, mesh_sentences, mesh_words
+from charnerf.reconstruction.report import mesh_sentences, mesh_words
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,8 @@ def _write(hero: Hero, name: str, output: Path, meshes: dict[str, BuiltMesh], su
     return MeshFiles(tuple(paths), first, sheet, tuple(notes))
 
 
-def write_convergence(hero: Hero, name: str, output: Path, built: BuiltMesh) -> tuple[str, ...]:
-    """Measure how many cameras a mesh needs, and show levels beside the chosen one: OUTPUT/NAME_cameras.md; its lines."""
-    lines = [f"# {name}: level and cameras", "", *level_lines(built), ""]
-    lines += convergence_lines(measure_convergence(hero.scene, hero.views, level=built.level))
+def write_convergence(hero: Hero, name: str, output: Path) -> tuple[str, ...]:
+    """Measure how many cameras a mesh needs: OUTPUT/NAME_cameras.md; its lines."""
+    lines = [f"# {name}: cameras", "", *convergence_lines(measure_convergence(hero.scene))]
     write_text(output / f"{name}_cameras.md", "\n".join(lines))
     return tuple(line for line in lines if line)

@@ -9,8 +9,8 @@ from charnerf.drawings.read_sheet import SheetViews
 from charnerf.drawings.turnaround import Turnaround
 from charnerf.finetuning.finetune import Finetuned
 from charnerf.finetuning.report import curve_table, summary_lines
-from charnerf.markdown import table
 from charnerf.meshing.build import BuiltMesh
+from charnerf.meshing.optical_depth import LIGHT_GONE
 from charnerf.reconstruction.quality import Quality, quality_words
 from charnerf.reporting.blocks import (
     Block,
@@ -27,8 +27,6 @@ from charnerf.reporting.blocks import (
 from charnerf.wording import counted
 
 SHOWN_VIEWS = 4
-ROWS_OF_LEVELS = 8
-LEVEL_HEADS = ("density", "distance, mm", "IoU")
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,6 @@ def report_facts(made: Made) -> dict[str, Any]:
             "faces": len(surface.faces),
             "extents_m": [float(one) for one in surface.extents],
             "texture": None if made.built.textured is None else made.built.textured.size,
-            "level": float(made.built.level),
         },
         "assumptions": list(made.assumptions),
         "warnings": list(made.warnings),
@@ -188,9 +185,9 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
     parts = counted(built.num_floaters, "loose part")
     cavities = counted(built.num_cavities, "hidden cavity", "hidden cavities")
     lines = [
-        f"Surface where the density is {built.level:.3g} per metre; Euler number "
-        f"{built.surface.euler_number}.",
-        f"{100 * built.missed:.1f} % of the figure's pixels in the drawings met no surface; densities were raised there.",
+        f"Surface where {100 * LIGHT_GONE:.0f} % of the light is gone on the clearest way in; Euler number"
+        f" {built.surface.euler_number}.",
+        f"{100 * built.missed:.1f} % of the figure's pixels in the drawings met no surface; optical depths were raised there.",
         f"{100 * share:.1f} % of the grid's points were left out: outside the hull or away from the surface.",
         f"{parts} and {cavities} were left out; of the parts no drawing needs {built.found.num_unneeded}.",
         f"Joined to the figure: {counted(built.found.num_joined, 'loose part')}.",
@@ -206,34 +203,5 @@ def mesh_sentences(built: BuiltMesh) -> list[str]:
 
 
 def _mesh(built: BuiltMesh) -> list[Block]:
-    """How the mesh came about, and the evidence for its level."""
-    blocks: list[Block] = [Heading("Mesh"), Bullets(mesh_sentences(built)), Text(_level_words(built))]
-    return blocks if built.choice is None else [*blocks, Table(LEVEL_HEADS, _level_rows(built))]
-
-
-def level_lines(built: BuiltMesh) -> list[str]:
-    """The density that the surface was drawn at, beside others, as Markdown."""
-    if built.choice is None:
-        return [_level_words(built)]
-    return [_level_words(built), "", *table(LEVEL_HEADS, _level_rows(built))]
-
-
-def _level_words(built: BuiltMesh) -> str:
-    if built.choice is None:
-        return f"The density {built.level:.3g} per metre was given, not chosen."
-    return (
-        "The density was chosen so that the surface lies where rendering, seen from around, loses half of its light. IoU: of"
-        " the surface's silhouettes with the drawings."
-    )
-
-
-def _level_rows(built: BuiltMesh) -> list[tuple[str, str, str]]:
-    """Density, distance from rendered depths, silhouettes; the chosen one is marked."""
-    assert built.choice is not None  # asked for by those that have one
-    tried, rows = built.choice.tried, []
-    step = max(1, len(tried) // ROWS_OF_LEVELS)
-    for index, one in enumerate(tried):
-        if index % step == 0 or one.level == built.level:
-            mark = " (chosen)" if one.level == built.level else ""
-            rows.append((f"{one.level:.3g}{mark}", f"{1000 * one.depth_error:.1f}", f"{one.mask_iou:.3f}"))
-    return rows
+    """How the mesh came about."""
+    return [Heading("Mesh"), Bullets(mesh_sentences(built))]

@@ -1,66 +1,18 @@
-"""A field's densities: averaged over directions, and on a regular grid.
-
-Letters: P points; N cameras averaged over; X, Y, Z grid points along the axes.
-"""
+"""A field's densities, averaged over directions. Letters: P points; N cameras averaged over."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
-import numpy as np
 import torch
 from torch import Tensor
-from torch.nn import functional as F
 
 from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.cameras import fibonacci_hemisphere
 from charnerf.geometry.framing import LEAST_DISTANCE
 from charnerf.geometry.safe import safe_normalize
 from charnerf.scene import Scene
-from charnerf.types import LeftOut
 from charnerf.volume.marching import densities_inside
 
 CHUNK = 8192  # points evaluated at once; larger batches leave the caches
-MIDDLE_LEVEL = 20.0  # 1/m; where interpolation between grid points is most faithful
-
-
-@dataclass(frozen=True)
-class DensityGrid:
-    """Densities at the points of a regular grid whose outermost layer is empty.
-
-    Attributes:
-        densities: (X, Y, Z), float32, 1/m, zero outside the hull. Blocks that carry no surface hold values
-            interpolated from their corners.
-        origin: World position of point (0, 0, 0), (3,), m.
-        spacing: Edge of a cell, m.
-        left_out: Grid points that were not evaluated, of all.
-    """
-
-    densities: np.ndarray
-    origin: np.ndarray
-    spacing: float
-    left_out: LeftOut
-
-    def interpolator(self, device: torch.device | str = "cpu") -> Callable[[Tensor], Tensor]:
-        """The function that reads densities (...) at points (..., 3), m, between the grid's; the border's beyond it.
-
-        Interpolated in a scale that runs nearly straight through a surface, as density itself does not.
-        """
-        volume = torch.from_numpy(np.ascontiguousarray(self.densities)).to(device)
-        contrast = (volume / (volume + MIDDLE_LEVEL))[None, None]
-        corner = torch.from_numpy(self.origin).to(volume)
-        extent = (torch.tensor(volume.shape) - 1).to(volume) * self.spacing
-
-        def density_at(points: Tensor) -> Tensor:
-            at = 2.0 * (points.to(volume) - corner) / extent - 1.0
-            # grid_sample takes the last axis of the volume first
-            flat = at.flip(-1).reshape(1, 1, 1, -1, 3)
-            read = F.grid_sample(contrast, flat, align_corners=True, padding_mode="border")
-            read = read.view(points.shape[:-1])
-            return MIDDLE_LEVEL * read / (1.0 - read).clamp_min(1e-6)
-
-        return density_at
 
 
 def averaged_density(scene: Scene, points: Tensor, num_cameras: int) -> Tensor:
