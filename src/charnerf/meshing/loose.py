@@ -27,6 +27,7 @@ from charnerf.meshing.outlines import ABOVE, MASK_ALPHA, MOST
 from charnerf.types import Cameras, SourceViews
 
 REACH = 0.5  # m: where values are the level, the longest path that joins; where they are half of it a path is half as long
+ROUNDS = 2  # a path through what is nearly empty is raised as far as may be, and reaches farther the second time
 THICKNESS = 0.02  # m around a path that is raised with it
 EIGHT = np.ones((3, 3), bool)  # a pixel and those around it
 
@@ -59,9 +60,12 @@ def tidied(grid: Grid, level: float, views: SourceViews) -> tuple[Grid, int, int
     Returns:
         The grid anew; how many parts were joined, and how many left out.
     """
-    parts = find_parts(grid, level, views)
-    grid, joined = join(grid, parts, level)
-    if joined:
+    parts, joined = find_parts(grid, level, views), 0
+    for _ in range(ROUNDS):
+        grid, found = join(grid, parts, level)
+        if found == 0:
+            break
+        joined += found
         parts = find_parts(grid, level, views)
     return without(grid, parts), joined, len(parts.unneeded)
 
