@@ -27,7 +27,9 @@ from charnerf.meshing.outlines import ABOVE, MASK_ALPHA, MOST
 from charnerf.types import Cameras, SourceViews
 
 REACH = 0.5  # m: where values are the level, the longest path that joins; where they are half of it a path is half as long
-ROUNDS = 2  # a path through what is nearly empty is raised as far as may be, and reaches farther the second time
+ROUNDS = (
+    2  # a path through what is nearly empty is raised as far as may be, and reaches farther the second time
+)
 THICKNESS = 0.02  # m around a path that is raised with it
 EIGHT = np.ones((3, 3), bool)  # a pixel and those around it
 
