@@ -11,7 +11,6 @@ from torchmetrics.functional.image import structural_similarity_index_measure
 
 from charnerf.errors import DataError, NumericalError, ShapeError
 from charnerf.evaluation import metrics
-from charnerf.evaluation.flip import flip_errors
 from charnerf.evaluation.lpips import Lpips
 
 EXAMPLES = Path(__file__).parent / "lpips"
@@ -98,23 +97,6 @@ def test_flip_is_zero_for_equal_pictures_and_grows_with_the_error(pair):
     assert 0.0 < small < large < 1.0
 
 
-@pytest.mark.parametrize("kind", ["noise", "nearly alike", "black on white", "a figure on white"])
-def test_flip_is_that_of_its_authors(kind):
-    """Pixel by pixel; roots of small differences make rounding 5e-5 there, means are nearer."""
-    first, second = torch.rand(2, 41, 33, 3, generator=torch.Generator().manual_seed(2))
-    if kind == "nearly alike":
-        second = (first + 0.02 * second).clamp_max(1.0)
-    elif kind == "black on white":
-        first, second = torch.zeros(2, 41, 33, 3) + torch.tensor([0.0, 1.0]).view(2, 1, 1, 1)
-    elif kind == "a figure on white":
-        first[:, :12] = second[:, :14] = first[:6] = 1.0
-    errors, mean, _ = evaluate(second.numpy(), first.numpy(), "LDR", applyMagma=False)
-    theirs = torch.from_numpy(errors)[..., 0]
-    torch.testing.assert_close(flip_errors(first, second), theirs, atol=2e-4, rtol=0.0)
-    assert metrics.flip(first, second) == pytest.approx(float(theirs.double().mean()), abs=5e-6)
-    assert float(mean) == pytest.approx(float(theirs.double().mean()), abs=5e-5)
-
-
 @pytest.mark.parametrize("place", [(0, 20), (30, 33), (12, 14)])
 def test_pictures_are_judged_around_their_figures_as_whole(place):
     """A figure on one colour in larger pictures: errors fall with the area alone, at edges and corners too."""
@@ -131,7 +113,7 @@ def test_pictures_are_judged_around_their_figures_as_whole(place):
     whole = structural_similarity_index_measure(*pairs, data_range=1.0)
     assert metrics.ssim(prediction, truth) == pytest.approx(float(whole), abs=1e-9)
     whole = evaluate(truth.numpy(), prediction.numpy(), "LDR", applyMagma=False)[1]
-    assert metrics.flip(prediction, truth) == pytest.approx(float(whole), abs=1e-6)
+    assert metrics.flip(prediction, truth) == pytest.approx(float(whole), abs=1e-7)
 
 
 def test_pictures_of_one_colour_are_alike():
