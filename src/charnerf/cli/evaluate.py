@@ -133,8 +133,7 @@ def command(
 
     source_drawer = _source_drawer(drawn, sources, reading)
     model = load_model(weights, device=device, trust=trust, renderer=renderer)
-    run = run_folder(model.source)
-    run_views, run_resolution = _measured_by(run)
+    run_views, run_resolution = _measured_by(run := run_folder(model.source))
     options = MeshOptions(resolution=resolution or run_resolution, height=None)
     metrics = evaluate(
         model.network,

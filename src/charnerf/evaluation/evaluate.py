@@ -56,8 +56,7 @@ def evaluate(
         views: Fixed views a character, evenly chosen, or "all".
         output: Folder for views.csv, and in images/NAME/ predictions (RGBA, named as the set's pictures) and sheet.png, or None.
         mesh: As `measure_character` takes it; without it figures of surfaces are null.
-        baselines: As `measure_character` takes it.
-        training: As `measure_character` takes it; without it figures of `nearest` are null.
+        baselines, training: As `measure_character` takes them; without training characters figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
         redrawn: Gives a character other source views, such as `drawings.redrawn` does.
         share: Which of the processes that measure the split together this is; each returns the numbers of all.
@@ -73,9 +72,9 @@ def evaluate(
     names = names_of(read_dataset(root), split)[share.process :: share.processes]
     processes = processes or processes_worth(len(names), network.device)
     measure = partial(_measured, of_one, Path(root), redrawn, views, output)
-    cost = partial(_figure_pixels, Path(root))
     with Progress(f"evaluate {split}") as progress:
-        results = _of_all(_every(measure, names, processes, cost, progress), share)
+        found = _every(measure, names, processes, partial(_figure_pixels, Path(root)), progress)
+    results = _of_all(found, share)
     if output is not None and share.process == 0:
         write_views(output / VIEWS_FILE, results)
     return split_metrics(
