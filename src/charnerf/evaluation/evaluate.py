@@ -56,7 +56,8 @@ def evaluate(
         views: Fixed views a character, evenly chosen, or "all".
         output: Folder for views.csv, and in images/NAME/ predictions (RGBA, named as the set's pictures) and sheet.png, or None.
         mesh: As `measure_character` takes it; without it figures of surfaces are null.
-        baselines, training: As `measure_character` takes them; without training characters figures of `nearest` are null.
+        baselines: As `measure_character` takes it.
+        training: As `measure_character` takes it; without it figures of `nearest` are null.
         train_seconds: Training time to report; None where it is unknown.
         redrawn: Gives a character other source views, such as `drawings.redrawn` does.
         share: Which of the processes that measure the split together this is; each returns the numbers of all.
@@ -72,9 +73,8 @@ def evaluate(
     names = names_of(read_dataset(root), split)[share.process :: share.processes]
     processes = processes or processes_worth(len(names), network.device)
     measure = partial(_measured, of_one, Path(root), redrawn, views, output)
-    with Progress(f"evaluate {split}") as progress:
-        found = _every(measure, names, processes, partial(_figure_pixels, Path(root)), progress)
-    results = _of_all(found, share)
+    cost = partial(_figure_pixels, Path(root))
+    results = _of_all(_every(measure, names, processes, cost, title=f"evaluate {split}"), share)
     if output is not None and share.process == 0:
         write_views(output / VIEWS_FILE, results)
     return split_metrics(
@@ -87,13 +87,15 @@ def _every(
     names: Sequence[str],
     processes: int,
     cost: Callable[[str], float],
-    progress: Progress,
+    *,
+    title: str,
 ) -> list[CharacterResult]:
-    """Measure characters by name, here one by one or in several processes."""
-    if min(processes, len(names)) > 1:
-        return measured_side_by_side(measure, names, processes, cost=cost, on_share=progress.update)
-    counters = [partial(progress.counter, of=(place, len(names))) for place in range(len(names))]
-    return [measure(name, counter=counter) for name, counter in zip(names, counters, strict=True)]
+    """Measure characters by name, here one by one or in several processes, under a bar with a title."""
+    with Progress(title) as progress:
+        if min(processes, len(names)) > 1:
+            return measured_side_by_side(measure, names, processes, cost=cost, on_share=progress.update)
+        counters = [partial(progress.counter, of=(place, len(names))) for place in range(len(names))]
+        return [measure(name, counter=counter) for name, counter in zip(names, counters, strict=True)]
 
 
 def _figure_pixels(root: Path, name: str) -> float:
