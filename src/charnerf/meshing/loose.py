@@ -162,7 +162,7 @@ def join(grid: Grid, parts: Parts, level: float) -> tuple[Grid, int]:
     if not parts.needed:
         return grid, 0
     body = np.argwhere(parts.labels == parts.body)[0]
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         costs = np.where(parts.labels > 0, 0.0, level / grid.values.astype(np.float64))
     # from face to face, as parts hang together; never through the empty
     search = MCP(costs, fully_connected=False)
