@@ -66,8 +66,16 @@ def test_modes_of_pictures_read_the_same(tmp_path):
     rgb.convert("P").save(tmp_path / "palette.png")
     Image.fromarray(grey.astype(np.uint16) * 257).save(tmp_path / "deep.png")
     rgb.convert("CMYK").save(tmp_path / "print.tif")
-    for name in ("grey.png", "palette.png", "deep.png", "print.tif"):
+    Image.fromarray(grey.astype(np.float32) / 255).save(tmp_path / "floats.tif")
+    for name in ("grey.png", "palette.png", "deep.png", "print.tif", "floats.tif"):
         np.testing.assert_allclose(load_drawing(tmp_path / name).rgba, expected, atol=2 / 255)
+
+
+def test_pixels_that_are_not_finite_are_refused(tmp_path):
+    values = np.ones((40, 30), np.float32)
+    values[20, 10] = np.nan
+    Image.fromarray(values).save(tmp_path / "holes.tif")
+    _fails(tmp_path / "holes.tif", "no finite numbers")
 
 
 def test_a_turned_photograph_is_turned_back(tmp_path):

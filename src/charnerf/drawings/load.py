@@ -143,12 +143,17 @@ def _to_srgb(picture: Image.Image, name: str) -> Image.Image:
 
 
 def _to_rgba(picture: Image.Image, name: str) -> np.ndarray:
-    """Decode to (H, W, 4) float32 sRGB, turned as the camera's note says, 16-bit grey scaled down."""
+    """Decode to (H, W, 4) float32 sRGB, turned as the camera's note says, 16-bit and float grey scaled."""
     picture.draft("RGB", (WORKING, WORKING))  # JPEG only: decodes a large one reduced
     turned = _to_srgb(ImageOps.exif_transpose(picture), name)
     if turned.mode.startswith("I") or turned.mode == "F":
         grey = np.asarray(turned, np.float64)
-        scale = 65535.0 if grey.max() > 255.0 else 255.0
+        most = grey.max()
+        if not np.isfinite(grey).all():
+            raise DataError(
+                f"{name}: found pixels that are no finite numbers, expected grey values. Export it again as PNG."
+            )
+        scale = 65535.0 if most > 255.0 else 1.0 if turned.mode == "F" and most <= 1.0 else 255.0
         turned = Image.fromarray(np.round(255.0 * (grey / scale).clip(0.0, 1.0)).astype(np.uint8), "L")
     return _reduce(turned.convert("RGBA"))
 
