@@ -243,6 +243,15 @@ def write_bytes(path: Path, content: bytes) -> None:
         aside.write_bytes(content)
 
 
+def _is_there(path: Path) -> bool:
+    """Whether there is anything by a name, a link to nothing too; OSError where no name can be so, as a too long one."""
+    try:
+        os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
 def check_folder(path: Path) -> None:
     """Check that a folder can be written to where a command is told to, before the work.
 
@@ -250,7 +259,7 @@ def check_folder(path: Path) -> None:
         DataError: If there, or above, is a file, or nothing can be written there: it is read only, full, or its name too long.
     """
     try:
-        nearest = next(one for one in (path, *path.absolute().parents) if os.path.lexists(one))
+        nearest = next(one for one in (path, *path.absolute().parents) if _is_there(one))
         if not nearest.is_dir():
             what = "a file" if nearest.exists() else "a link to nothing"
             raise DataError(f"{nearest}: found {what}, expected a folder to write to. Choose another.")
