@@ -16,6 +16,7 @@ from charnerf.bench.sweep import FACTORS
 from charnerf.bench.workbench import ADAPTIVE, BAKED, CULLED, TOLERANCE, Workbench
 from charnerf.evaluation.timing import Stopwatch
 from charnerf.geometry.resizing import resized_cameras
+from charnerf.meshing.optical_depth import SURFACE
 from charnerf.models.charnerf import CharNeRF
 from charnerf.types import SourceViews
 from charnerf.volume.renderers.baked import BakedRenderer
@@ -109,7 +110,7 @@ def growths(bench: Workbench, subject: Subject, pictured: Sequence[Pictured]) ->
         return lambda: BakedRenderer(**bench.like, tolerance=TOLERANCE, factor=factor).prepared(subject.scene)
 
     def grid(size: int) -> Callable[[], Any]:
-        return lambda: grid_sampler(subject, size, 8).evaluate_surface(50.0)
+        return lambda: grid_sampler(subject, size, 8).evaluate_surface(SURFACE)
 
     def seen_by(count: int) -> Callable[[], Any]:
         seen = _scene(bench.network, views[:, :count])
