@@ -1,4 +1,4 @@
-"""Values on a regular grid. Letters: X, Y, Z grid points along the axes."""
+"""Values on a regular grid. Letters: X, Y, Z grid points along the axes; R rays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from charnerf.types import LeftOut
+from charnerf.geometry.cameras import pixel_rays
+from charnerf.geometry.rays import box_interval
+from charnerf.types import Cameras, LeftOut, RayBundle
 
 
 @dataclass(frozen=True)
@@ -34,15 +36,22 @@ class Grid:
         values = self.values.astype(np.float64)
         return (values - level) / (values + level)
 
-    def interpolator(self, level: float, device: torch.device | str = "cpu") -> Callable[[Tensor], Tensor]:
+    def box(self) -> tuple[Tensor, Tensor]:
+        """The first point and the size of what the grid covers, (3,) float32 each, m."""
+        return torch.from_numpy(self.origin).float(), (torch.tensor(self.values.shape) - 1) * self.spacing
+
+    def rays_through(self, camera: Cameras, pixels: Tensor) -> tuple[RayBundle, Tensor, Tensor]:
+        """Rays of pixels (R, 2), and where they enter and leave the grid, (R,) each, m; the same where one misses it."""
+        rays, (corner, extent) = pixel_rays(camera, pixels), self.box()
+        return rays, *box_interval(rays, corner.to(rays.origins), (corner + extent).to(rays.origins))
+
+    def interpolator(self, level: float) -> Callable[[Tensor], Tensor]:
         """The function that reads values (...) at points (..., 3), m, between the grid's; the border's beyond it.
 
         Interpolated as `contrast` is, so that it is most faithful where values are the level.
         """
-        volume = torch.from_numpy(np.ascontiguousarray(self.values)).to(device)
+        volume, (corner, extent) = torch.from_numpy(np.ascontiguousarray(self.values)), self.box()
         share = (volume / (volume + level))[None, None]
-        corner = torch.from_numpy(self.origin).to(volume)
-        extent = (torch.tensor(volume.shape) - 1).to(volume) * self.spacing
 
         def value_at(points: Tensor) -> Tensor:
             at = 2.0 * (points.to(volume) - corner) / extent - 1.0

@@ -64,8 +64,7 @@ class GridSampler:
         self.shape: tuple[int, int, int] = tuple(int(c) + 1 for c in cells)  # type: ignore[assignment]
         self.values = np.zeros(self.shape, np.float32)
         self.settled = np.zeros(self.shape, bool)  # evaluated, or empty by definition
-        self.inside = self._inside()
-        self.settled[~self.inside] = True
+        self.settled[~self._inside()] = True
         self.num_evaluated = 0
 
     def _points(self, index: np.ndarray) -> Tensor:
@@ -101,16 +100,6 @@ class GridSampler:
         self.evaluate(np.ones(self.shape, bool))
         return self._depths()
 
-    def evaluate_coarse(self, stride: int) -> Grid:
-        """Evaluate every stride-th point alone and return the densities of these (stride divides BLOCK)."""
-        every = (slice(None, None, stride),) * 3
-        wanted = np.zeros(self.shape, bool)
-        wanted[every] = True
-        self.evaluate(wanted)
-        values = self.values[every].copy()
-        _empty_border(values)
-        return Grid(values, self.origin, self.spacing * stride, self._left_out())
-
     def evaluate_surface(self, depth: float) -> Grid:
         """Optical depths, by the blocks that the surface at a depth passes through and by every second point elsewhere.
 
@@ -120,19 +109,26 @@ class GridSampler:
         Args:
             depth: Optical depth of the surface.
         """
-        coarse = self.evaluate_coarse(2)
-        half = BLOCK // 2
-        low, high = _block_extremes(surface_values(coarse.values, coarse.spacing), half)
+        lattice = self._every_second()
+        low, high = _block_extremes(surface_values(lattice, 2 * self.spacing), BLOCK // 2)
         active = (high >= ACTIVE_SHARE * depth) & (low < depth)
         done = np.zeros_like(active)
         while True:
             self.evaluate(_points_of_blocks(active & ~done, self.shape))
             done |= active
-            self._fill_rest(coarse.values)
+            self._fill_rest(lattice)
             grid = self._depths()
             active = self._entered_from(done, grid.values > depth)
             if not bool(active.any()):
                 return grid
+
+    def _every_second(self) -> np.ndarray:
+        """Densities of every second point along each axis, evaluated."""
+        every = (slice(None, None, 2),) * 3
+        wanted = np.zeros(self.shape, bool)
+        wanted[every] = True
+        self.evaluate(wanted)
+        return self.values[every].copy()
 
     def _entered_from(self, done: np.ndarray, above: np.ndarray) -> np.ndarray:
         """Blocks into which the surface leads from evaluated ones: a shared face has points above it and others."""
@@ -183,13 +179,6 @@ def _occupied_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     cell = (hull.box_max.double() - corner) / hull.occupancy.shape[0]
     low, high = corner + index.amin(0) * cell, corner + (index.amax(0) + 1) * cell
     return low.cpu().numpy(), high.cpu().numpy()
-
-
-def _empty_border(values: np.ndarray) -> None:
-    for axis in range(3):
-        view = np.moveaxis(values, axis, 0)
-        view[0] = 0.0
-        view[-1] = 0.0
 
 
 def _windows(values: np.ndarray, size: int, axis: int) -> np.ndarray:

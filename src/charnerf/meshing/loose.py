@@ -19,8 +19,7 @@ import torch
 from scipy import ndimage
 from skimage.graph import MCP
 
-from charnerf.geometry.cameras import pixel_rays
-from charnerf.geometry.rays import box_interval, points_along
+from charnerf.geometry.rays import points_along
 from charnerf.meshing.extract import least_share
 from charnerf.meshing.grid import Grid
 from charnerf.meshing.outlines import ABOVE, MASK_ALPHA, MOST
@@ -28,7 +27,7 @@ from charnerf.types import Cameras, SourceViews
 
 REACH = 0.5  # m: where values are the level, the longest path that joins; where they are half of it a path is half as long
 ROUNDS = (
-    2  # a path through what is nearly empty is raised as far as may be, and reaches farther the second time
+    2  # a path through what is nearly empty is raised as far as may be: the second time it reaches farther
 )
 THICKNESS = 0.02  # m around a path that is raised with it
 EIGHT = np.ones((3, 3), bool)  # a pixel and those around it
@@ -126,16 +125,13 @@ def _labels_along(
 ) -> np.ndarray:
     """Labels of the grid points that pixels' rays pass, (R, S)."""
     pixels = torch.from_numpy(np.stack((columns, rows), axis=-1) + 0.5).to(camera.focal.dtype)
-    rays = pixel_rays(camera, pixels)
-    corner = torch.from_numpy(grid.origin).float()
-    extent = (torch.tensor(labels.shape) - 1) * grid.spacing
-    near, far = box_interval(rays, corner, corner + extent)
+    rays, near, far = grid.rays_through(camera, pixels)
     num = 2 * max(labels.shape)  # samples lie less than a cell apart
     share = (torch.arange(num) + 0.5) / num
     points = points_along(rays, near[:, None] + (far - near).clamp_min(0.0)[:, None] * share)
     last = np.array(labels.shape) - 1
     # what is clipped is read from the outermost layer, which is empty
-    index = ((points - corner) / grid.spacing).round().long().numpy().clip(0, last)
+    index = ((points - grid.box()[0]) / grid.spacing).round().long().numpy().clip(0, last)
     return np.asarray(labels[tuple(np.moveaxis(index, -1, 0))])
 
 
@@ -172,10 +168,8 @@ def join(grid: Grid, parts: Parts, level: float) -> tuple[Grid, int]:
     path = np.zeros(grid.values.shape, bool)
     for end in reached:
         path[tuple(np.transpose(search.traceback(end)))] = True
-    raised = path & (parts.labels == 0)
-    around = ndimage.binary_dilation(raised, iterations=max(1, round(THICKNESS / grid.spacing))) & (
-        grid.values > 0.0
-    )
+    thickness = max(1, round(THICKNESS / grid.spacing))
+    around = ndimage.binary_dilation(path & (parts.labels == 0), iterations=thickness) & (grid.values > 0.0)
     needed = ABOVE * level / np.maximum(grid.values, np.finfo(np.float32).tiny)
     values = grid.values * np.where(around, np.clip(needed, 1.0, MOST), 1.0).astype(np.float32)
     return replace(grid, values=values), len(reached)

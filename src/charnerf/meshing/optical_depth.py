@@ -37,9 +37,8 @@ def surface_values(densities: np.ndarray, spacing: float) -> np.ndarray:
     Returns:
         (X, Y, Z), float32.
     """
-    return least_optical_depth(densities, spacing) + np.float32(AHEAD) * densities.astype(
-        np.float32, copy=False
-    )
+    ahead = np.float32(AHEAD) * densities.astype(np.float32, copy=False)
+    return least_optical_depth(densities, spacing) + ahead
 
 
 def least_optical_depth(densities: np.ndarray, spacing: float) -> np.ndarray:
@@ -78,13 +77,12 @@ def _march(layers: np.ndarray, least: np.ndarray, across: tuple[int, ...], half:
 def _shifted(layer: np.ndarray, across: tuple[int, ...]) -> np.ndarray:
     """A layer (A, B) moved by a step of -1, 0 or 1 along each axis; what comes in is empty."""
     moved = np.zeros_like(layer)
-    to, come = zip(
-        *(_overlap(size, step) for size, step in zip(layer.shape, across, strict=True)), strict=True
-    )
-    moved[to] = layer[come]
+    moved[_begun(layer, across)] = layer[_begun(layer, (-across[0], -across[1]))]
     return moved
 
 
-def _overlap(size: int, step: int) -> tuple[slice, slice]:
-    """Where an axis' points go to and come from."""
-    return slice(max(step, 0), size + min(step, 0)), slice(max(-step, 0), size + min(-step, 0))
+def _begun(layer: np.ndarray, across: tuple[int, ...]) -> tuple[slice, ...]:
+    """The part of a layer (A, B) that is still in it when it is moved, where it then lies."""
+    return tuple(
+        slice(max(step, 0), size + min(step, 0)) for size, step in zip(layer.shape, across, strict=True)
+    )

@@ -16,8 +16,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from charnerf.geometry.cameras import pixel_rays, project_into_all
-from charnerf.geometry.rays import box_interval, points_along
+from charnerf.geometry.cameras import project_into_all
+from charnerf.geometry.rays import points_along
 from charnerf.meshing.grid import Grid
 from charnerf.types import Cameras, SourceViews
 
@@ -91,10 +91,8 @@ def raised_rays(grid: Grid, views: SourceViews, level: float) -> list[RaisedRays
 def _peaks(grid: Grid, camera: Cameras, mask: Tensor, level: float) -> Tensor:
     """Largest value along the rays (R,) of a mask's pixels (H, W)."""
     y, x = mask.nonzero().unbind(-1)
-    rays = pixel_rays(camera[0], torch.stack((x + 0.5, y + 0.5), dim=-1).to(camera.focal.dtype))
-    corner = torch.from_numpy(grid.origin).to(rays.origins)
-    extent = (torch.tensor(grid.values.shape) - 1).to(rays.origins) * grid.spacing
-    near, far = box_interval(rays, corner, corner + extent)
+    pixels = torch.stack((x + 0.5, y + 0.5), dim=-1).to(camera.focal.dtype)
+    rays, near, far = grid.rays_through(camera[0], pixels)
     if len(near) == 0:
         return near
     num = max(2, int(float((far - near).max()) / STEP))
