@@ -53,36 +53,30 @@ def least_optical_depth(densities: np.ndarray, spacing: float) -> np.ndarray:
     Returns:
         (X, Y, Z), float32; 0 on the outermost layer where that is empty.
     """
-    densities = densities.astype(np.float32, copy=False)
     least = np.full(densities.shape, np.inf, np.float32)
     for axis in range(3):
-        layers, lowest = np.moveaxis(densities, axis, 0), np.moveaxis(least, axis, 0)
+        layers = np.ascontiguousarray(np.moveaxis(densities, axis, 0), np.float32)
+        lowest = np.full_like(layers, np.inf)
         for across in product((-1, 0, 1), repeat=2):
+            if any(across[:axis]):  # an axis before went that way
+                continue
             half = np.float32(0.5 * spacing * math.sqrt(1 + across[0] ** 2 + across[1] ** 2))
             _march(layers, lowest, across, half)
             _march(layers[::-1], lowest[::-1], across, half)
+        np.minimum(least, np.moveaxis(lowest, 0, axis), out=least)
     return least
 
 
 def _march(layers: np.ndarray, least: np.ndarray, across: tuple[int, ...], half: np.float32) -> None:
     """Go through layers, (N, A, B), from the first to the last by steps sideways; `least` (N, A, B) is lowered to what is found."""
-    depth = np.zeros_like(layers[0])
-    before = np.zeros_like(depth)
+    shape = layers.shape[1:]
+    come = np.zeros(
+        [size + 2 for size in shape], np.float32
+    )  # depths half a step beyond the layer before, a rim of nothing around
+    here = tuple(slice(1, 1 + size) for size in shape)
+    there = tuple(slice(1 - step, 1 - step + size) for size, step in zip(shape, across, strict=True))
     for layer, lowest in zip(layers, least, strict=True):
-        depth = _shifted(depth + half * before, across) + half * layer
+        added = half * layer
+        depth = come[there] + added
         np.minimum(lowest, depth, out=lowest)
-        before = layer
-
-
-def _shifted(layer: np.ndarray, across: tuple[int, ...]) -> np.ndarray:
-    """A layer (A, B) moved by a step of -1, 0 or 1 along each axis; what comes in is empty."""
-    moved = np.zeros_like(layer)
-    moved[_begun(layer, across)] = layer[_begun(layer, (-across[0], -across[1]))]
-    return moved
-
-
-def _begun(layer: np.ndarray, across: tuple[int, ...]) -> tuple[slice, ...]:
-    """The part of a layer (A, B) that is still in it when it is moved, where it then lies."""
-    return tuple(
-        slice(max(step, 0), size + min(step, 0)) for size, step in zip(layer.shape, across, strict=True)
-    )
+        np.add(depth, added, out=come[here])
