@@ -13,5 +13,5 @@ def test_a_field_too_thin_for_a_mesh_is_said_and_the_run_goes_on(figure_dataset,
     run = small_runs.assemble(cfg, tmp_path)
     with caplog.at_level(logging.WARNING), torch.no_grad():
         finish.write_first_mesh(tmp_path, figure_dataset, "twin", run.module.model.eval(), run.board)
-    assert "No mesh of twin: density grid: found densities" in caplog.text
+    assert "No mesh of twin: grid: found values from 0 to" in caplog.text
     assert not (tmp_path / "meshes").exists()
