@@ -2,6 +2,7 @@
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import torch
 
 from charnerf.interruption import SIGNALS
 from charnerf.process import use_fastest_products
+from charnerf.thread_count import restored_threads
 from charnerf.types import SourceViews
 from support import helpers
 
@@ -54,6 +56,14 @@ def _signals_of_a_terminal() -> None:
 @pytest.fixture(autouse=True)
 def _one_seed() -> None:
     torch.manual_seed(0)
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> Iterator[None]:
+    """A test leaves torch one thread: with more those after it wait for one another, and a forked process waits for ever."""
+    with restored_threads():
+        yield
+        assert torch.get_num_threads() == 1
 
 
 @pytest.fixture(scope="session")

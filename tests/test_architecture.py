@@ -26,6 +26,7 @@ FLOORS = (  # from the ground up; a room may import rooms on floors below its ow
         "markdown",
         "pools",
         "progress",
+        "thread_count",
     ),
     ("parallel", "pictures", "viewer"),
     ("process",),

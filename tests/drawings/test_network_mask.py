@@ -1,5 +1,6 @@
 """Figures cut out by a network of rembg: a real session on a model file of one layer, written here by its format."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ from charnerf.drawings.load import drawing_from_array
 from charnerf.drawings.network_mask import NetworkMask
 from charnerf.errors import ConfigError, DataError
 
-pytest.importorskip("rembg")
+if find_spec("rembg") is None:  # imported by what is tested alone: it changes settings of the process
+    pytest.skip("needs the extra rembg", allow_module_level=True)
 SIDE = 320  # of the pictures that u2netp reads
 
 

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from charnerf.training.threads import ThreadChoice, may_choose, restored_threads
+from charnerf.training.threads import ThreadChoice, may_choose
 
 IDLE = {1: 0.17, 2: 0.155}
 LOADED = {1: 0.28, 2: 0.44}
@@ -83,11 +83,3 @@ def test_the_user_and_budgets_in_steps_fix_the_number(monkeypatch):
     assert not may_choose(budget_seconds=None)
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     assert not may_choose(budget_seconds=400.0)
-
-
-def test_the_number_is_given_back():
-    before = torch.get_num_threads()
-    with pytest.raises(KeyError), restored_threads():
-        torch.set_num_threads(before + 1)
-        raise KeyError
-    assert torch.get_num_threads() == before

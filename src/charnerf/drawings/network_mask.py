@@ -9,6 +9,7 @@ from PIL import Image
 from charnerf.drawings.load import Drawing
 from charnerf.errors import ConfigError, DependencyError
 from charnerf.pictures import on_white, to_bytes
+from charnerf.thread_count import restored_threads
 from charnerf.wording import install_words, typed_or_clicked
 
 MODEL = "isnet-anime"  # trained on drawn figures
@@ -42,8 +43,7 @@ class NetworkMask:
 
     def __call__(self, drawing: Drawing) -> np.ndarray:
         """Share (H, W) in [0, 1] of each pixel that is figure."""
-        from rembg import new_session
-
+        new_session = _rembg().new_session
         self._session = self._session or new_session(self.model)
         (mask,) = self._session.predict(Image.fromarray(to_bytes(on_white(drawing.rgba))))
         return np.asarray(mask, np.float32) / 255.0
@@ -55,9 +55,15 @@ def _option() -> str:
 
 def _session_types() -> dict[str, Any]:
     """Models of rembg that work on this machine with one file and answer with one mask, by name."""
+    named = {one.name(): one for one in _rembg().sessions.sessions_class if one.is_local()}
+    return {name: one for name, one in named.items() if not name.endswith(("_custom", "_cloth_seg", "sam"))}
+
+
+def _rembg() -> Any:
+    """The library, whose own libraries (Numba) set the number of threads of all others as they are imported."""
     try:
-        from rembg.sessions import sessions_class
+        with restored_threads():
+            import rembg.sessions
     except ImportError as error:
         raise DependencyError(f"{_option()}: {error}. {install_words('rembg')}") from error
-    named = {one.name(): one for one in sessions_class if one.is_local()}
-    return {name: one for name, one in named.items() if not name.endswith(("_custom", "_cloth_seg", "sam"))}
+    return rembg

@@ -22,6 +22,7 @@ from charnerf.interruption import Stopped, held
 from charnerf.losses.base import Needs
 from charnerf.losses.total import WeightedLosses
 from charnerf.models.charnerf import CharNeRF
+from charnerf.thread_count import restored_threads
 from charnerf.training.board import Board
 from charnerf.training.checkpoint import find_checkpoint
 from charnerf.training.clock import RunClock
@@ -32,7 +33,7 @@ from charnerf.training.module import TrainingModule
 from charnerf.training.processes import first_speaks, meet, processes_to_begin, run_processes
 from charnerf.training.run_lock import RunLock
 from charnerf.training.start import begin
-from charnerf.training.threads import ThreadTuner, may_choose, restored_threads
+from charnerf.training.threads import ThreadTuner, may_choose
 from charnerf.training.trainer import build_trainer
 from charnerf.volume.renderers.base import AbstractRenderer
 

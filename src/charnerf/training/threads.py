@@ -7,8 +7,6 @@ processes each wait may last until the awaited thread gets its core back, and tw
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from statistics import median
 from typing import Any, final
 
@@ -145,13 +143,3 @@ def may_choose(*, budget_seconds: float | None) -> bool:
     MKL_NUM_THREADS, where set, are the user's choice.
     """
     return budget_seconds is not None and not any(name in os.environ for name in FIXED_BY)
-
-
-@contextmanager
-def restored_threads() -> Iterator[None]:
-    """Leave torch's number of threads as it was."""
-    before = torch.get_num_threads()
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
