@@ -262,8 +262,11 @@ def test_what_a_class_refuses_is_told_before_any_work() -> None:
 
 
 def test_labelled_points_need_a_hull() -> None:
-    message = problem("loss.occupancy.weight=0.1", "model.hull=false", "features=image")
+    no_hull = ("model.hull=false", "features=image", "schedule=constant")
+    message = problem("loss.occupancy.weight=0.1", *no_hull)
     assert message.startswith("model.hull: found false, but loss.occupancy reads labelled points")
+    message = problem(*no_hull, "schedule=inside_last")
+    assert "but schedule.phases.1.loss_weights.occupancy reads labelled points" in message
 
 
 def test_settings_without_effect_are_warned_of(conf: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from torch import nn
 
 from charnerf.config.composition import compose_config
+from charnerf.data.silhouettes import SilhouetteSpace
 from charnerf.errors import DataError
 from charnerf.inference.build import build_model
 from charnerf.models.encoders.hourglass import Hourglass
@@ -94,6 +95,17 @@ def test_without_meshes_it_trains_by_rays_alone_and_says_so_once(tmp_path, caplo
     told = [record.getMessage() for record in caplog.records if "mesh" in record.getMessage()]
     assert len(told) == 1 and "rays alone" in told[0]
     assert [batch[2:] for batch in run.recorder.batches] == [(64, 0)] * 4
+
+
+def test_without_meshes_points_are_labelled_by_pictures_which_is_said_once(tmp_path, caplog):
+    root = tmp_path / "dataset"
+    for name in ("one", "other"):
+        helpers.write_figure(root, name, "train", helpers.ball(0.5), views=2, mesh=False)
+    cfg = small_runs.smoke_config(root, "schedule=inside_last", "space=solid", *ONE, "scale.steps=4")
+    with caplog.at_level(logging.WARNING, logger="charnerf"):
+        run = small_runs.assemble(cfg, tmp_path / "run").fit()
+    assert sum("labelled by its pictures" in record.getMessage() for record in caplog.records) == 1
+    assert all(isinstance(one.space, SilhouetteSpace) for one in run.data.train_store._open.values())
 
 
 def test_without_a_hull_none_is_carved(figure_dataset, tmp_path):

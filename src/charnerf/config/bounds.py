@@ -26,7 +26,7 @@ LARGEST: Mapping[str, float] = {  # numbers by name, of whichever section
     **dict.fromkeys(("mesh_resolution", "workers"), 1024),
     **dict.fromkeys(("views", "eval_views", "times"), 100_000),
     **dict.fromkeys(("rays", "surface_points", "phase_rays", "phase_surface_points"), 10**7),
-    **dict.fromkeys(("space_points", "num_points"), 10**7),
+    **dict.fromkeys(("space_points", "space_pool", "pool_size", "num_points"), 10**7),
     **dict.fromkeys(
         ("train", "train_characters", "val", "test", "characters", "memory_mib", "cache_mib", "window"), 10**7
     ),

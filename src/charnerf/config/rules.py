@@ -75,10 +75,21 @@ def _some_term_counts(terms: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[
             yield key, f"found {weight}, expected 0 or more."
 
 
-def _labelled_points_lie_in_a_hull(weight: float, hull: bool) -> Iterator[tuple[str, str]]:
-    if weight > 0 and not hull:
-        reason = "loss.occupancy reads labelled points, expected a hull to draw them in"
-        yield "model.hull", f"found false, but {reason}; set loss.occupancy.weight=0 or model.hull=true."
+def _labelled_points_lie_in_a_hull(
+    weight: float, phases: Sequence[Mapping[str, Any]], hull: bool
+) -> Iterator[tuple[str, str]]:
+    if hull:
+        return
+    reason = "reads labelled points, expected a hull to draw them in"
+    if weight > 0:
+        yield (
+            "model.hull",
+            f"found false, but loss.occupancy {reason}; set loss.occupancy.weight=0 or model.hull=true.",
+        )
+    for index, phase in enumerate(phases):
+        if (phase.get("loss_weights") or {}).get("occupancy", 0.0) > 0:
+            key = f"schedule.phases.{index}.loss_weights.occupancy"
+            yield "model.hull", f"found false, but {key} {reason}; set schedule=constant or model.hull=true."
 
 
 def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
@@ -101,7 +112,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss",), _some_term_counts),
-    (("loss.occupancy.weight", "model.hull"), _labelled_points_lie_in_a_hull),
+    (("loss.occupancy.weight", "schedule.phases", "model.hull"), _labelled_points_lie_in_a_hull),
     (("averaging.decay",), _average_moves),
     _at_least_one("data.views"),
     _at_least_one("data.train"),

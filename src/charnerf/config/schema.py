@@ -34,6 +34,7 @@ class Scale:
     phase_rays: list[Count]
     phase_surface_points: list[CountOrZero]
     space_points: CountOrZero
+    space_pool: Count
     learning_rate: Annotated[float, Above(0)]
     train_characters: Count
     batch_characters: Count

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from omegaconf import DictConfig
+from torch import Tensor
 
 from charnerf.data.augmentation.sequence import AugmentationSequence
 from charnerf.data.characters import Character
@@ -12,7 +13,9 @@ from charnerf.data.datamodule import MixedDataModule
 from charnerf.data.mixed import MixedDataset
 from charnerf.data.sampler import PhaseSampler, Share
 from charnerf.data.shards import is_cache, read_index_once
-from charnerf.data.store import CharacterStore, SurfaceOf, no_space, no_surface
+from charnerf.data.silhouettes import SilhouetteSpace
+from charnerf.data.space import AbstractSpace
+from charnerf.data.store import CharacterStore, SpaceOf, SurfaceOf, no_space, no_surface
 from charnerf.data.surface import AbstractSurface
 from charnerf.data.window import Window, groups_of
 from charnerf.inference.build import build_part
@@ -20,6 +23,7 @@ from charnerf.losses.base import Needs
 from charnerf.models.charnerf import CharNeRF
 from charnerf.surfaces.mesh_files import load_surface_mesh
 from charnerf.training.clock import RunClock
+from charnerf.types import Hull
 
 log = logging.getLogger(__name__)
 
@@ -55,7 +59,7 @@ def build_data(
         memory_mib=batches.memory_mib,
         workers=batches.workers,
         surface_of=_surface_of(cfg) if needs.surface else no_surface,
-        space_of=build_part(cfg.space) if needs.space_points else no_space,
+        space_of=_space_of(cfg) if needs.space_points else no_space,
         make_dataset=make_dataset,
         sampler=PhaseSampler(
             schedule=build_part(cfg.schedule), position=clock.position, num_marks=validation.times
@@ -92,3 +96,21 @@ def _surface_of(cfg: DictConfig) -> SurfaceOf:
         return make_surface(load_surface_mesh(character.mesh_file))
 
     return surface_of
+
+
+def _space_of(cfg: DictConfig) -> SpaceOf:
+    """Opens what a character's labelled points are drawn from; its pictures without a mesh, which is logged once."""
+    make_space: SpaceOf = build_part(cfg.space)
+    warned_of: set[str] = set()
+
+    def space_of(character: Character, images: Tensor, hull: Hull | None) -> AbstractSpace | None:
+        if character.mesh_file is not None or hull is None:
+            return make_space(character, images, hull)
+        if not warned_of:
+            log.warning(
+                "Character %s has no mesh: points in it are labelled by its pictures.", character.name
+            )
+            warned_of.add(character.name)
+        return SilhouetteSpace(character, images, hull)
+
+    return space_of
