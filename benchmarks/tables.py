@@ -136,7 +136,8 @@ def _steps(result: Any) -> list[str]:
 
 def _scaling(result: Any) -> list[str]:
     rows = [
-        {k: ", ".join(map(_short, v)) if isinstance(v, list) else v for k, v in one.items()} for one in result
+        {k: ", ".join(map(_short, v)) if isinstance(v, list | tuple) else v for k, v in one.items()}
+        for one in result
     ]
     return [rows_table(rows)]
 

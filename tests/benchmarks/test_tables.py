@@ -206,3 +206,18 @@ def test_parts_run_on_the_released_weights(name, tmp_path, monkeypatch):
     assert part["part"] == name and part["result"]
     assert (tmp_path / f"{name}.png").is_file() == (name in DRAWN)
     assert SECTIONS[name][0] in (tmp_path / "bench.md").read_text(encoding="utf-8")
+
+
+def test_growth_reads_the_same_as_measured_and_as_kept() -> None:
+    """What was measured holds tuples, what was kept in JSON lists."""
+    rows = [
+        {
+            "over": "image side, pixels",
+            "sizes": (64, 128),
+            "seconds": (0.0512345, 0.2),
+            "seconds_exponent": 2.0,
+        }
+    ]
+    _, show = SECTIONS["scaling"]
+    assert show(rows) == show(json.loads(json.dumps(rows)))
+    assert "0.0512, 0.2" in show(rows)[0]
