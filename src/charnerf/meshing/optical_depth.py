@@ -70,9 +70,8 @@ def least_optical_depth(densities: np.ndarray, spacing: float) -> np.ndarray:
 def _march(layers: np.ndarray, least: np.ndarray, across: tuple[int, ...], half: np.float32) -> None:
     """Go through layers, (N, A, B), from the first to the last by steps sideways; `least` (N, A, B) is lowered to what is found."""
     shape = layers.shape[1:]
-    come = np.zeros(
-        [size + 2 for size in shape], np.float32
-    )  # depths half a step beyond the layer before, a rim of nothing around
+    # depths half a step beyond the layer before, a rim of nothing around
+    come = np.zeros([size + 2 for size in shape], np.float32)
     here = tuple(slice(1, 1 + size) for size in shape)
     there = tuple(slice(1 - step, 1 - step + size) for size, step in zip(shape, across, strict=True))
     for layer, lowest in zip(layers, least, strict=True):

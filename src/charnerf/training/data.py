@@ -85,13 +85,11 @@ def _window(root: Path, names: Sequence[str], batches: DictConfig, *, seed: int)
 def _surface_of(cfg: DictConfig) -> SurfaceOf:
     """Opens a character's surface; None without a mesh, which is logged once."""
     make_surface: Callable[..., AbstractSurface] = build_part(cfg.surface)
-    warned_of: set[str] = set()
+    warn = _warned_once("Character %s has no mesh: it is trained by rays alone.")
 
     def surface_of(character: Character) -> AbstractSurface | None:
         if character.mesh_file is None:
-            if not warned_of:
-                log.warning("Character %s has no mesh: it is trained by rays alone.", character.name)
-                warned_of.add(character.name)
+            warn(character)
             return None
         return make_surface(load_surface_mesh(character.mesh_file))
 
@@ -101,16 +99,24 @@ def _surface_of(cfg: DictConfig) -> SurfaceOf:
 def _space_of(cfg: DictConfig) -> SpaceOf:
     """Opens what a character's labelled points are drawn from; its pictures without a mesh, which is logged once."""
     make_space: SpaceOf = build_part(cfg.space)
-    warned_of: set[str] = set()
+    warn = _warned_once("Character %s has no mesh: points in it are labelled by its pictures.")
 
     def space_of(character: Character, images: Tensor, hull: Hull | None) -> AbstractSpace | None:
         if character.mesh_file is not None or hull is None:
             return make_space(character, images, hull)
-        if not warned_of:
-            log.warning(
-                "Character %s has no mesh: points in it are labelled by its pictures.", character.name
-            )
-            warned_of.add(character.name)
+        warn(character)
         return SilhouetteSpace(character, images, hull)
 
     return space_of
+
+
+def _warned_once(message: str) -> Callable[[Character], None]:
+    """Logs a message of the first character that it is called with."""
+    first: list[str] = []
+
+    def warn(character: Character) -> None:
+        if not first:
+            first.append(character.name)
+            log.warning(message, character.name)
+
+    return warn
