@@ -108,6 +108,11 @@ def test_a_model_that_answers_the_hull_scores_as_the_hull(outcome):
     found, _ = outcome
     for key in METRIC_KEYS:
         assert found[key] == found["baselines"]["visual_hull"][key]
+    assert found["baselines"]["visual_hull"]["ahead"] == {
+        "silhouette_iou": [],
+        "psnr_union": [],
+        "chamfer_mm": [],
+    }
     assert found["baselines"]["white"]["chamfer_mm"] is None
     assert found["baselines"]["white"]["silhouette_iou"] == 0.0
 

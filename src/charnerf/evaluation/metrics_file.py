@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 
+from charnerf.evaluation.ahead import characters_ahead
 from charnerf.evaluation.angles import ANGLE_KEYS, by_azimuth, by_elevation, by_source_angle
 from charnerf.evaluation.character import OURS, CharacterResult
 from charnerf.evaluation.environment import environment
@@ -58,13 +59,15 @@ def split_metrics(
 
 
 def _baselines(results: Sequence[CharacterResult]) -> dict[str, Any]:
-    """Every metric of the baselines; the hull's seconds, and which training characters were nearest."""
+    """Every metric of the baselines, and where they beat the model; the hull's seconds; which training characters were nearest."""
+    names, ours = [result.name for result in results], [result.scores[OURS] for result in results]
     baselines: dict[str, Any] = {}
     for method in results[0].scores:
         if method != OURS:
             scores = [result.scores[method] for result in results]
             by_angle = by_azimuth([each.views for each in scores], VIEW_KEYS)
-            baselines[method] = {**summarize(scores), "by_azimuth": by_angle}
+            ahead = characters_ahead(names, scores, ours)
+            baselines[method] = {**summarize(scores), "by_azimuth": by_angle, "ahead": ahead}
     if "nearest" in baselines:
         baselines["nearest"]["found"] = {
             result.name: {"character": near.name, "silhouette_iou_of_sources": near.iou}

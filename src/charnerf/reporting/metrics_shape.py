@@ -6,6 +6,7 @@ from typing import Any
 
 from charnerf.data.layout import check_name
 from charnerf.errors import DataError
+from charnerf.evaluation.ahead import AHEAD_KEYS
 from charnerf.evaluation.scores import METRIC_KEYS
 
 _LARGEST = 1e30  # of any number
@@ -30,9 +31,25 @@ def check_metrics(metrics: Mapping[str, Any], file: Path) -> None:
                 check_name(f"{file}: per_character:", one)
                 if missing := [key for key in METRIC_KEYS if key not in figures]:
                     raise DataError(f"{where}: lacks {', '.join(missing)}; evaluate again.")
+            else:
+                _check_names(figures.get("ahead", {}), f"{where}: ahead")
     _check_scores(_object(metrics.get("drawings", {}), f"{file}: drawings"), f"{file}: drawings")
     _object(metrics.get("environment", {}), f"{file}: environment")
     _check_scores({key: value for key, value in metrics.items() if key not in _TABLES}, str(file))
+
+
+def _check_names(value: Any, where: str) -> None:
+    """Check lists of characters by metric."""
+    for key, names in _object(value, where).items():
+        if key not in AHEAD_KEYS or not (
+            isinstance(names, list) and all(isinstance(one, str) for one in names)
+        ):
+            raise DataError(
+                f"{where}.{key[:60]}: found {str(names)[:60]}, expected one of {', '.join(AHEAD_KEYS)} and a list of names;"
+                " evaluate again."
+            )
+        for name in names:
+            check_name(f"{where}.{key}:", name)
 
 
 def _check_scores(figures: Mapping[str, Any], where: str) -> None:

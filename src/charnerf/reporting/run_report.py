@@ -14,6 +14,7 @@ from charnerf.reporting.run_files import read_curve, read_metrics
 from charnerf.wording import counted
 
 MAX_SHEETS = 12
+MOST_NAMES = 8
 MOST_WIDTH = 420  # pixels of pictures that stand side by side
 
 
@@ -33,7 +34,12 @@ def write_run_report(run_folder: str | Path, *, more: Sequence[Block] = ()) -> P
     folder = Path(run_folder)
     metrics = read_metrics(folder / "metrics.json")
     title = f"charnerf run {folder.name}"
-    blocks: list[Block] = [Heading(title, 1), Text(verdict(metrics), lead=True), _headline(metrics)]
+    blocks: list[Block] = [
+        Heading(title, 1),
+        Text(verdict(metrics), lead=True),
+        _headline(metrics),
+        *_ahead(metrics),
+    ]
     worst_first = _worst_first(metrics)
     sheets = _sheets(folder, worst_first, metrics)
     shown = _best_middle_worst(sheets)
@@ -85,6 +91,24 @@ def _headline(metrics: Mapping[str, Any]) -> Table:
         seconds = [seconds_text(spent.get(stage)) for stage in ("encode", "render_per_frame")]
         cells.append([name, *metric_cells(scores), *seconds])
     return Table(header, cells, emphasis=True)
+
+
+def _ahead(metrics: Mapping[str, Any]) -> list[Block]:
+    """On which characters the visual hull has the truer shape than the model: a reason not to use the model there."""
+    ahead = metrics.get("baselines", {}).get("visual_hull", {}).get("ahead", {})
+    if not ahead:
+        return []
+    lines = [
+        f"{COLUMNS[key][0]}: {len(names)} of {metrics['num_characters']}{_named(names)}"
+        for key, names in ahead.items()
+    ]
+    return [Text("Characters of which the visual hull has the truer shape, by"), Bullets(lines)]
+
+
+def _named(names: Sequence[str]) -> str:
+    """A few names in brackets, and how many more there are; nothing for none."""
+    shown = [*names[:MOST_NAMES], *([f"{len(names) - MOST_NAMES} more"] if len(names) > MOST_NAMES else [])]
+    return f" ({', '.join(shown)})" if shown else ""
 
 
 def _worst_first(metrics: Mapping[str, Any]) -> list[str]:
