@@ -97,14 +97,16 @@ def test_without_meshes_it_trains_by_rays_alone_and_says_so_once(tmp_path, caplo
     assert [batch[2:] for batch in run.recorder.batches] == [(64, 0)] * 4
 
 
-def test_without_meshes_points_are_labelled_by_pictures_which_is_said_once(tmp_path, caplog):
+@pytest.mark.parametrize(("space", "warnings"), [("solid", 1), ("silhouettes", 0)])
+def test_without_meshes_points_are_labelled_by_pictures_which_is_said_once(space, warnings, tmp_path, caplog):
     root = tmp_path / "dataset"
     for name in ("one", "other"):
         helpers.write_figure(root, name, "train", helpers.ball(0.5), views=2, mesh=False)
-    cfg = small_runs.smoke_config(root, "schedule=inside_last", "space=solid", *ONE, "scale.steps=4")
+    cfg = small_runs.smoke_config(root, "schedule=inside_last", f"space={space}", *ONE, "scale.steps=4")
     with caplog.at_level(logging.WARNING, logger="charnerf"):
         run = small_runs.assemble(cfg, tmp_path / "run").fit()
-    assert sum("labelled by its pictures" in record.getMessage() for record in caplog.records) == 1
+    told = sum("labelled by its pictures" in record.getMessage() for record in caplog.records)
+    assert told == warnings
     assert all(isinstance(one.space, SilhouetteSpace) for one in run.data.train_store._open.values())
 
 

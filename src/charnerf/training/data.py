@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from omegaconf import DictConfig
@@ -97,12 +98,13 @@ def _surface_of(cfg: DictConfig) -> SurfaceOf:
 
 
 def _space_of(cfg: DictConfig) -> SpaceOf:
-    """Opens what a character's labelled points are drawn from; its pictures without a mesh, which is logged once."""
-    make_space: SpaceOf = build_part(cfg.space)
+    """Opens what a character's labelled points are drawn from; its pictures without a mesh, logged once if not asked for."""
+    make_space: partial[AbstractSpace] = build_part(cfg.space)
+    by_pictures = make_space.func is SilhouetteSpace
     warn = _warned_once("Character %s has no mesh: points in it are labelled by its pictures.")
 
     def space_of(character: Character, images: Tensor, hull: Hull | None) -> AbstractSpace | None:
-        if character.mesh_file is not None or hull is None:
+        if by_pictures or character.mesh_file is not None or hull is None:
             return make_space(character, images, hull)
         warn(character)
         return SilhouetteSpace(character, images, hull)
