@@ -1,4 +1,4 @@
-"""Points in space that the silhouettes label inside or outside."""
+"""Points in space that the mesh or the pictures label inside or outside."""
 
 from collections.abc import Sequence
 from typing import final

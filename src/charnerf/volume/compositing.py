@@ -121,8 +121,7 @@ def composite(weights: Tensor, values: Tensor, background: Tensor) -> Tensor:
 def expected_depth(weights: Tensor, t_vals: Tensor, far: Tensor) -> Tensor:
     """Expected distance along the ray of the part that is seen; far where nothing is seen.
 
-    The mean of t_vals under the weights, in which the background at far takes part with a weight of 1e-7,
-    the rounding of an
+    The mean of t_vals under the weights, in which the background at far takes part with a weight of 1e-7, the rounding of an
     opacity: no division by zero, and a gradient of at most 1e7 * (far - near) on rays that see nothing.
 
     Args:
