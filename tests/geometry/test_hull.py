@@ -64,20 +64,38 @@ def test_the_hull_is_tight(orthographic):
     assert hull.occupancy.float().mean() < 0.4
 
 
-def test_coarse_to_fine_is_the_same_as_testing_all_cells():
-    views = views_of(FIGURES["lefty"])[0]
-    outside = torch.stack([hull_module._distance_to(image[3] > 0.05) for image in views.images])
+@pytest.mark.parametrize("pinholes", [(), (1,), (0, 1, 2)], ids=["layers", "both", "coarse to fine"])
+def test_layers_and_coarse_to_fine_are_the_same_as_testing_all_cells(pinholes):
+    drawn = [views_of(FIGURES["lefty"], orthographic=view not in pinholes)[0] for view in range(3)]
+    outside = torch.stack(
+        [hull_module._distance_to(one.images[view, 3] > 0.05) for view, one in enumerate(drawn)]
+    )
+    parts = {
+        name: torch.stack([getattr(one.cameras, name)[view] for view, one in enumerate(drawn)])
+        for name in ("world_from_camera", "focal", "principal_point", "orthographic")
+    }
+    cameras = replace(drawn[0].cameras, **parts)
     low, high = torch.tensor((-0.8, -0.5, -0.1)), torch.tensor((0.9, 0.5, 2.1))
     dilations = torch.ones(3)
-    found = hull_module._occupancy(outside, views.cameras, dilations, low, high, 128)
+    found = hull_module._occupancy(outside, cameras, dilations, low, high, 128)
     axis = torch.arange(128)
     index = torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1).reshape(-1, 3)
     cell = (high - low) / 128
     touched = hull_module._may_touch(
-        outside, views.cameras, dilations, low + (index + 0.5) * cell, 0.5 * cell.norm()
+        outside, cameras, dilations, low + (index + 0.5) * cell, 0.5 * cell.norm()
     )
     assert torch.equal(found, touched.reshape(128, 128, 128))
     assert 0.01 < found.float().mean() < 0.5
+
+
+def test_a_camera_within_the_box_is_no_layer():
+    """What lies behind it is not known to be empty."""
+    views = views_of(FIGURES["lefty"])[0]
+    camera = views.cameras[:1]
+    low, high = BOX_MIN, BOX_MAX
+    assert hull_module._axis_seen_along(camera[0], low, high) == 1
+    within = torch.tensor((-1.8, -5.0, -0.8))
+    assert hull_module._axis_seen_along(camera[0], within, high) is None
 
 
 @pytest.mark.parametrize("orthographic", [True, False])

@@ -185,7 +185,61 @@ def _may_touch(
 def _occupancy(
     outside: Tensor, cameras: Cameras, dilations: Tensor, low: Tensor, high: Tensor, grid_size: int
 ) -> Tensor:
-    """Occupied cells of a grid over a box, coarse to fine: a cell that no silhouette touches has no child that any does."""
+    """Occupied cells of a grid over a box.
+
+    A view along an axis of the world, as drawings are, is asked about one layer of cells: all others project like it.
+    """
+    occupancy = torch.ones(grid_size, grid_size, grid_size, dtype=torch.bool, device=low.device)
+    others = []
+    for view in range(len(outside)):
+        along = _axis_seen_along(cameras[view], low, high)
+        if along is None:
+            others.append(view)
+        else:
+            one = slice(view, view + 1)
+            occupancy &= _touched_layer(
+                outside[one], cameras[one], dilations[one], low, high, grid_size, along
+            )
+    return (
+        _refined(outside[others], cameras[others], dilations[others], low, high, occupancy)
+        if others
+        else occupancy
+    )
+
+
+def _axis_seen_along(camera: Cameras, low: Tensor, high: Tensor) -> int | None:
+    """The world's axis along which an orthographic camera sees all of a box; None if there is none."""
+    backward, centre = camera.world_from_camera[:3, 2], camera.world_from_camera[:3, 3]
+    along = int(backward.abs().argmax())
+    is_straight = bool(camera.orthographic) and float(backward.abs().sum() - backward[along].abs()) < 1e-6
+    nearest = high[along] if backward[along] > 0 else low[along]
+    sees_all = float((centre[along] - nearest) * backward[along]) > 0
+    return along if is_straight and sees_all else None
+
+
+def _touched_layer(
+    outside: Tensor,
+    camera: Cameras,
+    dilation: Tensor,
+    low: Tensor,
+    high: Tensor,
+    grid_size: int,
+    along: int,
+) -> Tensor:
+    """Cells of the middle layer that may project into one view's dilated silhouette, one cell thick along the axis seen along."""
+    cell = (high - low) / grid_size
+    axes = [low[axis] + (torch.arange(grid_size, device=low.device) + 0.5) * cell[axis] for axis in range(3)]
+    axes[along] = 0.5 * (low + high)[along : along + 1]
+    centres = torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)
+    touched = _may_touch(outside, camera, dilation, centres.reshape(-1, 3), 0.5 * cell.norm())
+    return touched.view(centres.shape[:3])
+
+
+def _refined(
+    outside: Tensor, cameras: Cameras, dilations: Tensor, low: Tensor, high: Tensor, left: Tensor
+) -> Tensor:
+    """The cells left that views touch, coarse to fine: a cell that no silhouette touches has no child that any does."""
+    grid_size = left.shape[0]
     side = min(32, grid_size)
     axis = torch.arange(side, device=low.device)
     index = torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1).reshape(-1, 3)
@@ -193,6 +247,8 @@ def _occupancy(
         torch.meshgrid(*[torch.arange(2, device=low.device)] * 3, indexing="ij"), dim=-1
     ).reshape(1, 8, 3)
     while True:
+        pooled = left.view(*[side, grid_size // side] * 3).any(1).any(2).any(3)
+        index = index[pooled[index[:, 0], index[:, 1], index[:, 2]]]
         cell = (high - low) / side
         centres = low + (index + 0.5) * cell
         is_last = side >= grid_size
@@ -202,7 +258,7 @@ def _occupancy(
             break
         index = (2 * index[:, None] + octants).reshape(-1, 3)
         side *= 2
-    occupancy = torch.zeros(side, side, side, dtype=torch.bool, device=low.device)
+    occupancy = torch.zeros_like(left)
     occupancy[index[:, 0], index[:, 1], index[:, 2]] = True
     return occupancy
 
