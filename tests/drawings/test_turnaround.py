@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from PIL import Image
+from PIL import Image, ImageOps
 
 from charnerf.drawings.cutout import cut_out
 from charnerf.drawings.load import drawing_from_array
@@ -175,6 +175,13 @@ def test_on_the_page_sentences_name_buttons_and_no_options():
         and "“As drawn” takes" in told
         and "--" not in told
     )
+
+
+def test_of_two_sides_none_is_advised_to_take_the_name_of_the_other():
+    front, left, right = _arrays((paint("front"), paint("side"), ImageOps.mirror(paint("side"))))
+    drawn = {viewpoint("front"): front, viewpoint("left"): left, viewpoint("right"): right}
+    told = " ".join(read_views(drawn, size=SIZE).assumptions)
+    assert "swap the two" in told and "--side" not in told
 
 
 def test_what_was_assumed_is_told_and_drawn(reference):

@@ -228,13 +228,18 @@ def _assumptions(figures: Sequence[DrawnFigure], extent: float, size: int) -> li
         "The lowest point of each figure was put on the floor line, the middle of its width on the axis."
     )
     lines.append(f"The pictures show {2 * extent:.2f} m a side without perspective, {size} x {size} pixels.")
-    for figure in figures:
-        if figure.viewpoint.name in ("left", "right"):
-            side, other = ("left", "right") if figure.viewpoint.name == "left" else ("right", "left")
-            lines.append(
-                f"The side drawing was taken as the character's {side} side: it looks towards the picture's {side}. If it"
-                f" looks the other way, {call_it(other)}."
-            )
+    sides = [figure.viewpoint.name for figure in figures if figure.viewpoint.name in ("left", "right")]
+    if len(sides) == 2:  # calling one of them the other would name a side twice
+        lines.append(
+            f"The {sides[0]} and {sides[1]} drawings look towards the picture's {sides[0]} and {sides[1]}. If they look the other"
+            " way, swap the two."
+        )
+    elif sides:
+        other = "right" if sides == ["left"] else "left"
+        lines.append(
+            f"The side drawing was taken as the character's {sides[0]} side: it looks towards the picture's {sides[0]}. If it looks"
+            f" the other way, {call_it(other)}."
+        )
     return lines
 
 
