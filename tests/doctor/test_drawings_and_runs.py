@@ -42,6 +42,12 @@ def examined(folder: Path) -> list[Finding]:
     return list(drawing_findings(named))
 
 
+def test_a_picture_too_small_is_not_blamed_on_its_background(tmp_path: Path) -> None:
+    Image.new("RGB", (10, 24), "white").save(tmp_path / "back.png")
+    (finding,) = examined(tmp_path)
+    assert finding.fault == "unusable picture" and "Use a larger picture" in finding.found
+
+
 @pytest.mark.slow
 def test_clean_drawings(drawn: Path) -> None:
     assert examined(drawn) == []

@@ -47,6 +47,16 @@ def drawing_findings(given: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
             continue
         try:
             drawing = load_drawing(file)
+        except DataError as error:
+            yield Finding(
+                "unusable picture",
+                str(file),
+                str(error),
+                "a picture that reconstruct reads",
+                "Export the drawing anew.",
+            )
+            continue
+        try:
             cutout = cut_out(drawing)
             box = figure_box(cutout.rgba[..., 3], str(file))
         except DataError as error:
