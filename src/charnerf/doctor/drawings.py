@@ -7,7 +7,6 @@ import numpy as np
 
 from charnerf.doctor.figure import CROPPED
 from charnerf.doctor.finding import Finding
-from charnerf.doctor.picture_files import picture_findings
 from charnerf.doctor.repairs import mirror_command
 from charnerf.drawings.align import figure_box, on_one_scale
 from charnerf.drawings.cutout import cut_out
@@ -39,22 +38,12 @@ def drawing_findings(given: Mapping[Viewpoint, Path]) -> Iterator[Finding]:
     whole: dict[Viewpoint, tuple[Path, np.ndarray]] = {}
     heights: dict[Path, tuple[float, tuple[int, int]]] = {}
     for view, file in given.items():
-        picture, findings = picture_findings(file, (0, 0))
-        yield from (
-            one for one in findings if one.fault != "colour profile"
-        )  # drawings are read by their profile
-        if picture is None:
-            continue
         try:
             drawing = load_drawing(file)
         except DataError as error:
             yield Finding(
-                "unusable picture",
-                str(file),
-                str(error),
-                "a picture that reconstruct reads",
-                "Export the drawing anew.",
-            )
+                "unusable picture", str(file), str(error), "a picture that reconstruct reads", "Export it again, as it says."
+            )  # fmt: skip
             continue
         try:
             cutout = cut_out(drawing)
