@@ -237,6 +237,27 @@ def test_combinations_that_can_not_work_are_named() -> None:
     assert problem("loss.opacity.weight=-1") == "loss.opacity.weight: found -1, expected 0 or more."
 
 
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("combinator.temperature=0", "more than 0"),
+        ("combinator.lr_scale=-1", "more than 0"),
+        ("optimizer.lr=-1", "more than 0"),
+        ("optimizer.matrix_lr=0", "more than 0"),
+        ("space.spread=0", "more than 0"),
+        ("space.num_directions=0", "at least 1"),
+        ("space.pool_size=0", "at least 1"),
+        ("space.near_share=2", "a share, 0 to 1"),
+        ("combinator.view_scale=nan", "a number"),
+        ("combinator.temperature=nan", "a number"),
+        ("loss.opacity.weight=nan", "a number"),
+    ],
+)
+def test_numbers_that_no_training_could_use_are_named(override: str, expected: str) -> None:
+    key, found = override.split("=")
+    assert problem("combinator=view_mha", override) == f"{key}: found {found}, expected {expected}."
+
+
 def test_phases_that_do_not_ascend_are_named() -> None:
     one = "{_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0, until: {steps: 5}}"
     last = "{_target_: charnerf.schedule.Phase, rays: 8, surface_points: 0}"

@@ -6,6 +6,7 @@ section* has a frozen dataclass as its schema. Everything here works on plain di
 
 import dataclasses
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
@@ -77,6 +78,8 @@ def check_value(hint: Any, value: Any, key: str, problems: Problems, slot: Part 
         return
     if not fits(hint, value):
         problems.add(key, f"found {shown(value)}, expected {describe(hint)}.")
+    elif isinstance(value, float) and math.isnan(value):
+        problems.add(key, "found nan, expected a number.")
     elif isinstance(value, int | float) and not isinstance(value, bool) and abs(value) > largest(key):
         problems.add(key, f"found {shown_number(value)}, expected at most {shown_number(largest(key))}.")
     else:

@@ -21,11 +21,6 @@ def _heads_divide_width(heads: int, width: int, inner: int | None) -> Iterator[t
         yield "combinator.num_heads", f"found {heads}, expected a divisor of {name} = {wide}."
 
 
-def _lr_scale_is_positive(lr_scale: float) -> Iterator[tuple[str, str]]:
-    if not lr_scale > 0:
-        yield "combinator.lr_scale", f"found {lr_scale}, expected more than 0."
-
-
 def _names_a_folder(name: str) -> Iterator[tuple[str, str]]:
     is_one = (
         name.isprintable() and not set("/\\") & set(name) and name.strip(". ") and len(name) <= LONGEST_NAME
@@ -97,6 +92,19 @@ def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
         yield "averaging.decay", f"found {decay}, expected below 1: at 1 the average would never move."
 
 
+def _near_share_is_one(share: float) -> Iterator[tuple[str, str]]:
+    if not 0 <= share <= 1:
+        yield "space.near_share", f"found {share}, expected a share, 0 to 1."
+
+
+def _above_zero(key: str) -> tuple[tuple[str, ...], Rule]:
+    def rule(value: Any) -> Iterator[tuple[str, str]]:
+        if isinstance(value, int | float) and not value > 0:
+            yield key, f"found {value}, expected more than 0."
+
+    return (key,), rule
+
+
 def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
     def rule(value: Any) -> Iterator[tuple[str, str]]:
         if isinstance(value, int | float) and value < 1:
@@ -108,12 +116,19 @@ def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("name",), _names_a_folder),
     (("combinator.num_heads", "model.width", "combinator.attention_width"), _heads_divide_width),
-    (("combinator.lr_scale",), _lr_scale_is_positive),
     (("budget.steps", "budget.seconds"), _something_ends_the_run),
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss",), _some_term_counts),
     (("loss.occupancy.weight", "schedule.phases", "model.hull"), _labelled_points_lie_in_a_hull),
     (("averaging.decay",), _average_moves),
+    _above_zero("combinator.lr_scale"),
+    _above_zero("combinator.temperature"),
+    _above_zero("optimizer.lr"),
+    _above_zero("optimizer.matrix_lr"),
+    _above_zero("space.spread"),
+    _at_least_one("space.pool_size"),
+    _at_least_one("space.num_directions"),
+    (("space.near_share",), _near_share_is_one),
     _at_least_one("data.views"),
     _at_least_one("data.train"),
     _at_least_one("data.val"),
