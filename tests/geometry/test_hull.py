@@ -88,6 +88,14 @@ def test_layers_and_coarse_to_fine_are_the_same_as_testing_all_cells(pinholes):
     assert 0.01 < found.float().mean() < 0.5
 
 
+def test_the_hull_in_double_precision_is_the_same():
+    views = views_of(FIGURES["lefty"])
+    single = build_hull(views, box_min=BOX_MIN, box_max=BOX_MAX)
+    double = build_hull(views.to(torch.float64), box_min=BOX_MIN.double(), box_max=BOX_MAX.double())
+    assert double.front_depths.dtype == torch.float64
+    assert (single.occupancy == double.occupancy).float().mean() > 0.9999
+
+
 def test_a_camera_within_the_box_is_no_layer():
     """What lies behind it is not known to be empty."""
     views = views_of(FIGURES["lefty"])[0]

@@ -228,7 +228,10 @@ def _touched_layer(
 ) -> Tensor:
     """Cells of the middle layer that may project into one view's dilated silhouette, one cell thick along the axis seen along."""
     cell = (high - low) / grid_size
-    axes = [low[axis] + (torch.arange(grid_size, device=low.device) + 0.5) * cell[axis] for axis in range(3)]
+    axes = [
+        low[axis] + (torch.arange(grid_size, dtype=low.dtype, device=low.device) + 0.5) * cell[axis]
+        for axis in range(3)
+    ]
     axes[along] = 0.5 * (low + high)[along : along + 1]
     centres = torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)
     touched = _may_touch(outside, camera, dilation, centres.reshape(-1, 3), 0.5 * cell.norm())
