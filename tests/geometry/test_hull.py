@@ -9,7 +9,7 @@ import torch
 
 from charnerf.errors import DataError
 from charnerf.geometry import hull as hull_module
-from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all
+from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all, world_axis_along
 from charnerf.geometry.hull import build_hull, hull_contains, occupied_edges
 from charnerf.types import Hull, RayBundle, SourceViews
 from support import helpers
@@ -101,9 +101,9 @@ def test_a_camera_within_the_box_is_no_layer():
     views = views_of(FIGURES["lefty"])[0]
     camera = views.cameras[:1]
     low, high = BOX_MIN, BOX_MAX
-    assert hull_module._axis_seen_along(camera[0], low, high) == 1
+    assert world_axis_along(camera[0], torch.stack((low, high))) == 1
     within = torch.tensor((-1.8, -5.0, -0.8))
-    assert hull_module._axis_seen_along(camera[0], within, high) is None
+    assert world_axis_along(camera[0], torch.stack((within, high))) is None
 
 
 @pytest.mark.parametrize("orthographic", [True, False])

@@ -14,14 +14,13 @@ from skimage.measure import marching_cubes
 from torch import Tensor
 
 from charnerf.evaluation.projected import FAR, ProjectedMesh, look_up
-from charnerf.geometry.cameras import project
+from charnerf.geometry.cameras import project, world_axis_along
 from charnerf.geometry.world import BOX_HALF_EXTENT, CENTRE
 from charnerf.types import Cameras, RenderOutput, SourceViews
 
 _COARSE_CELL = 0.06
 _FINE_CELL = 0.012
 _MAX_CELLS = 3_000_000
-_ASIDE = 1e-6  # of a direction: what is no more aside goes along an axis, micrometres off at the far end
 _POINTS_AT_ONCE = 65_536  # 3 MiB a tensor; all at once would take 500 MiB
 
 
@@ -99,20 +98,12 @@ def grid_field(
     ends = torch.stack((low, low + cell * (torch.tensor(counts) - 1)))
     field = torch.full(counts, torch.inf)
     for view in range(len(edge_distances)):
-        along = _axis_along(cameras[view], ends)
+        along = world_axis_along(cameras[view], ends)
         x, y, z = (1 if axis == along else count for axis, count in enumerate(counts))
         one = slice(view, view + 1)
         values = _in_chunks(cameras[one], edge_distances[one], _grid_points(low, cell, (x, y, z)))
         field = torch.minimum(field, values.view(x, y, z))
     return field
-
-
-def _axis_along(camera: Cameras, ends: Tensor) -> int | None:
-    """Axis along which an orthographic camera of shape () looks at a box of corners (2, 3), which is all before it; else None."""
-    shares, axes = camera.world_from_camera[:3, 2].abs().sort(descending=True)
-    in_front = project(camera, ends)[2]
-    alike = bool(camera.orthographic) and float(shares[1]) < _ASIDE and bool(in_front.all())
-    return int(axes[0]) if alike else None
 
 
 def _grid_points(low: Tensor, cell: float, counts: tuple[int, int, int]) -> Tensor:

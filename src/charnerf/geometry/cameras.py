@@ -14,6 +14,8 @@ from charnerf.checks import check_last_dim
 from charnerf.geometry.safe import safe_normalize
 from charnerf.types import Cameras, RayBundle, SourceViews
 
+ASIDE = 1e-6  # of a direction: what is no more aside goes along an axis, micrometres off at the far end
+
 
 def fibonacci_hemisphere(num_points: int) -> Tensor:
     """Spread points evenly over the upper hemisphere.
@@ -254,6 +256,22 @@ def directions_to_points(cameras: Cameras, points: Tensor) -> Tensor:
     along_axis = -cameras.world_from_camera[:, :3, 2]
     towards = safe_normalize(points[:, None] - cameras.world_from_camera[:, :3, 3])
     return torch.where(cameras.orthographic[:, None], along_axis, towards)
+
+
+def world_axis_along(camera: Cameras, ends: Tensor) -> int | None:
+    """Axis of the world along which an orthographic camera of shape () looks at a box: layers across it project alike.
+
+    Args:
+        camera: Of shape ().
+        ends: Lower and upper corner of the box, (2, 3), m.
+
+    Returns:
+        None where the camera is a pinhole, looks aside of all axes, or has a part of the box behind it.
+    """
+    shares, axes = camera.world_from_camera[:3, 2].abs().sort(descending=True)
+    in_front = project(camera, ends)[2]
+    alike = bool(camera.orthographic) and float(shares[1:].sum()) < ASIDE and bool(in_front.all())
+    return int(axes[0]) if alike else None
 
 
 def pixel_lattice(cameras: Cameras) -> tuple[Tensor, float] | None:

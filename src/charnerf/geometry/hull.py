@@ -11,7 +11,7 @@ from scipy import ndimage
 from torch import Tensor
 
 from charnerf.errors import DataError
-from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all
+from charnerf.geometry.cameras import pixel_centres, pixel_rays, project_into_all, world_axis_along
 from charnerf.geometry.occupied import POOL, RAYS_AT_ONCE, candidates, coarse_occupancy, occupied_at
 from charnerf.geometry.rays import box_interval
 from charnerf.types import Cameras, Hull, RayBundle, SourceViews
@@ -190,9 +190,9 @@ def _occupancy(
     A view along an axis of the world, as drawings are, is asked about one layer of cells: all others project like it.
     """
     occupancy = torch.ones(grid_size, grid_size, grid_size, dtype=torch.bool, device=low.device)
-    others = []
+    ends, others = torch.stack((low, high)), []
     for view in range(len(outside)):
-        along = _axis_seen_along(cameras[view], low, high)
+        along = world_axis_along(cameras[view], ends)
         if along is None:
             others.append(view)
         else:
@@ -200,21 +200,9 @@ def _occupancy(
             occupancy &= _touched_layer(
                 outside[one], cameras[one], dilations[one], low, high, grid_size, along
             )
-    return (
-        _refined(outside[others], cameras[others], dilations[others], low, high, occupancy)
-        if others
-        else occupancy
-    )
-
-
-def _axis_seen_along(camera: Cameras, low: Tensor, high: Tensor) -> int | None:
-    """The world's axis along which an orthographic camera sees all of a box; None if there is none."""
-    backward, centre = camera.world_from_camera[:3, 2], camera.world_from_camera[:3, 3]
-    along = int(backward.abs().argmax())
-    is_straight = bool(camera.orthographic) and float(backward.abs().sum() - backward[along].abs()) < 1e-6
-    nearest = high[along] if backward[along] > 0 else low[along]
-    sees_all = float((centre[along] - nearest) * backward[along]) > 0
-    return along if is_straight and sees_all else None
+    if not others:
+        return occupancy
+    return _refined(outside[others], cameras[others], dilations[others], low, high, occupancy)
 
 
 def _touched_layer(
