@@ -1,6 +1,7 @@
 """What no single value of a config can show: combinations that can not work."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from hydra.utils import get_object
@@ -92,25 +93,16 @@ def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
         yield "averaging.decay", f"found {decay}, expected below 1: at 1 the average would never move."
 
 
-def _near_share_is_one(share: float) -> Iterator[tuple[str, str]]:
-    if not 0 <= share <= 1:
-        yield "space.near_share", f"found {share}, expected a share, 0 to 1."
-
-
-def _above_zero(key: str) -> tuple[tuple[str, ...], Rule]:
+def _bounded(key: str, holds: Callable[[float], bool], expected: str) -> tuple[tuple[str, ...], Rule]:
     def rule(value: Any) -> Iterator[tuple[str, str]]:
-        if isinstance(value, int | float) and not value > 0:
-            yield key, f"found {value}, expected more than 0."
+        if isinstance(value, int | float) and not holds(value):
+            yield key, f"found {value}, expected {expected}."
 
     return (key,), rule
 
 
-def _at_least_one(key: str) -> tuple[tuple[str, ...], Rule]:
-    def rule(value: Any) -> Iterator[tuple[str, str]]:
-        if isinstance(value, int | float) and value < 1:
-            yield key, f"found {value}, expected at least 1."
-
-    return (key,), rule
+_above_zero = partial(_bounded, holds=lambda value: value > 0, expected="more than 0")
+_at_least_one = partial(_bounded, holds=lambda value: value >= 1, expected="at least 1")
 
 
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
@@ -128,7 +120,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     _above_zero("space.spread"),
     _at_least_one("space.pool_size"),
     _at_least_one("space.num_directions"),
-    (("space.near_share",), _near_share_is_one),
+    _bounded("space.near_share", holds=lambda share: 0 <= share <= 1, expected="a share, 0 to 1"),
     _at_least_one("data.views"),
     _at_least_one("data.train"),
     _at_least_one("data.val"),
