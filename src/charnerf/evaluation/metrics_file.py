@@ -36,6 +36,7 @@ def split_metrics(
     ours = [result.scores[OURS] for result in results]
     views = [scores.views for scores in ours]
     drawings = [result.drawings for result in results if result.drawings is not None]
+    per_character = _by_character(results, OURS)
     return {
         "split": split,
         "num_characters": len(results),
@@ -45,10 +46,9 @@ def split_metrics(
         "by_elevation": by_elevation(views, VIEW_KEYS),
         "by_source_angle": by_source_angle(views, VIEW_KEYS),
         "per_character": {
-            result.name: {"num_views": len(result.frames), **summarize([scores])}
-            for result, scores in zip(results, ours, strict=True)
+            result.name: {"num_views": len(result.frames), **per_character[result.name]} for result in results
         },
-        "baselines": _baselines(results),
+        "baselines": _baselines(results, per_character),
         **({"drawings": summarize(drawings)} if drawings else {}),
         "seconds": _seconds(results, train_seconds),
         **_memory(results, device),
@@ -58,15 +58,19 @@ def split_metrics(
     }
 
 
-def _baselines(results: Sequence[CharacterResult]) -> dict[str, Any]:
+def _by_character(results: Sequence[CharacterResult], method: str) -> dict[str, dict[str, Any]]:
+    """The means of a method over the views of each character."""
+    return {result.name: summarize([result.scores[method]]) for result in results}
+
+
+def _baselines(results: Sequence[CharacterResult], ours: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Every metric of the baselines, and where they beat the model; the hull's seconds; which training characters were nearest."""
-    names, ours = [result.name for result in results], [result.scores[OURS] for result in results]
     baselines: dict[str, Any] = {}
     for method in results[0].scores:
         if method != OURS:
             scores = [result.scores[method] for result in results]
             by_angle = by_azimuth([each.views for each in scores], VIEW_KEYS)
-            ahead = characters_ahead(names, scores, ours)
+            ahead = characters_ahead(_by_character(results, method), ours)
             baselines[method] = {**summarize(scores), "by_azimuth": by_angle, "ahead": ahead}
     if "nearest" in baselines:
         baselines["nearest"]["found"] = {
