@@ -1,6 +1,6 @@
 """Words of sentences: numbers, what every terminal can show, and what to do where options are typed or clicked."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -30,6 +30,12 @@ def install_words(extra: str) -> str:
 def counted(number: int, one: str, many: str | None = None) -> str:
     """A number with its noun: 1 run, 2 runs; `many` where an s is not enough."""
     return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """The first few names, and how many more there are: "one, two, and 3 more"; "" without any."""
+    left = len(names) - most
+    return ", ".join([*names[:most], *([f"and {left} more"] if left > 0 else [])])
 
 
 def printable(text: str) -> str:

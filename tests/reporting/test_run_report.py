@@ -46,7 +46,7 @@ def test_characters_of_which_the_hull_is_truer_are_named(run, tmp_path):
     metrics["baselines"]["visual_hull"]["ahead"] = {"silhouette_iou": names, "psnr_union": []}
     (tmp_path / "metrics.json").write_text(json.dumps(metrics))
     text = write_run_report(tmp_path).read_text()
-    assert f"- IoU ↑: 10 of 2 ({', '.join(names[:8])}, 2 more)\n- union ↑ dB: 0 of 2\n" in text
+    assert f"- IoU ↑: 10 of 2 ({', '.join(names[:8])}, and 2 more)\n- union ↑ dB: 0 of 2\n" in text
     del metrics["baselines"]["visual_hull"]["ahead"]  # as it was before there was such a thing
     (tmp_path / "metrics.json").write_text(json.dumps(metrics))
     assert "truer shape" not in write_run_report(tmp_path).read_text()

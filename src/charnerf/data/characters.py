@@ -19,6 +19,7 @@ from charnerf.files import inside
 from charnerf.geometry.framing import SOURCE_ORDER
 from charnerf.pictures import open_picture
 from charnerf.types import Cameras, SourceViews
+from charnerf.wording import listed
 
 MOST_NAMES = 12  # in a message
 
@@ -107,10 +108,9 @@ def _absent(root: Path, name: str) -> DataError:
             f"{root / name}: no such folder, expected the character {name!r}; capture it or take it out of the split."
         )
     like = difflib.get_close_matches(name, names, n=3)
-    shown = [*like, *(one for one in names if one not in like)][:MOST_NAMES]
-    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    shown = listed([*like, *(one for one in names if one not in like)], MOST_NAMES)
     return DataError(
-        f"{root}: found no character {name!r}, expected one of the data set's: {', '.join(shown) or 'it has none'}{more}."
+        f"{root}: found no character {name!r}, expected one of the data set's: {shown or 'it has none'}."
     )
 
 

@@ -17,6 +17,7 @@ from charnerf.doctor.views import View
 from charnerf.errors import DataError
 from charnerf.files import inside
 from charnerf.foreign.shot import picture_size
+from charnerf.wording import listed
 
 _SQUARE_OFF = 1e-3  # of a rotation
 _FOCALS_APART = 0.01  # share by which two that are one may differ, as rounded
@@ -239,16 +240,16 @@ _EXPECTED = {
 
 def _findings(read: _Read) -> Iterator[Finding]:
     for kind, entries in read.wrong.items():
-        key, found = entries[0]
         expected, fix = _EXPECTED[kind]
-        more = f", and {len(entries) - 1} more" if len(entries) > 1 else ""
-        yield Finding(kind, f"{read.path}: {key}", found + more, expected, fix, pose_command(kind, read.path))
+        found = listed([value for _, value in entries], 1)
+        yield Finding(
+            kind, f"{read.path}: {entries[0][0]}", found, expected, fix, pose_command(kind, read.path)
+        )
     if read.missing:
-        more = f", and {len(read.missing) - 1} more" if len(read.missing) > 1 else ""
         yield Finding(
             "missing file",
             str(read.path),
-            f"no {read.missing[0]}{more}",
+            f"no {listed(read.missing, 1)}",
             f"every picture that {read.path.name} names",
             "Restore them, or capture the character again.",
             "charnerf capture MESH -o DATASET --split SPLIT",

@@ -25,7 +25,7 @@ from charnerf.foreign.shot import read_mask
 from charnerf.foreign.transforms_json import TransformsJson, camera_files
 from charnerf.geometry.carving import spread
 from charnerf.parallel import in_processes
-from charnerf.wording import counted
+from charnerf.wording import counted, listed
 
 MOST_ALIKE = 3  # findings of one kind that are told of a character
 PICTURE_SIDE = 256  # pixels of evidence
@@ -72,9 +72,8 @@ def _split_findings(root: Path, splits: Mapping[str, Sequence[str]]) -> Iterator
     for measured in ("val", "test"):
         both = sorted(set(splits.get("train", ())) & set(splits.get(measured, ())))
         if both:
-            more = f", and {len(both) - 1} more" if len(both) > 1 else ""
             yield Finding(
-                "character in two splits", str(root / DATASET_FILE), f"{both[0]}{more} in train and in {measured}",
+                "character in two splits", str(root / DATASET_FILE), f"{listed(both, 1)} in train and in {measured}",
                 "characters to measure on that are not trained on", "Take them out of one of the two.",
             )  # fmt: skip
 
@@ -178,8 +177,7 @@ def _of_ours(root: Path, name: str) -> Patient:
     views, findings = _read(folder, [path])
     lost = [view.depth for view in views if view.depth is not None and not view.depth.is_file()]
     if lost:
-        more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
-        found, expected = f"no {lost[0]}{more}", "every depth picture that it names"
+        found, expected = f"no {listed([str(one) for one in lost], 1)}", "every depth picture that it names"
         findings.append(Finding("missing file", str(path), found, expected, "Capture it again.", DEPTH_AGAIN))
     if views and not any(view.is_source for view in views):
         fix = "Capture the character again, or read it as a foreign set."

@@ -11,7 +11,7 @@ from charnerf.reporting.formats import BASELINE_NAMES, COLUMNS, cell, metric_cel
 from charnerf.reporting.meshes import run_meshes
 from charnerf.reporting.plots import plot_angles, plot_training
 from charnerf.reporting.run_files import read_curve, read_metrics
-from charnerf.wording import counted
+from charnerf.wording import counted, listed
 
 MAX_SHEETS = 12
 MOST_NAMES = 8
@@ -107,8 +107,7 @@ def _ahead(metrics: Mapping[str, Any]) -> list[Block]:
 
 def _named(names: Sequence[str]) -> str:
     """A few names in brackets, and how many more there are; nothing for none."""
-    shown = [*names[:MOST_NAMES], *([f"{len(names) - MOST_NAMES} more"] if len(names) > MOST_NAMES else [])]
-    return f" ({', '.join(shown)})" if shown else ""
+    return f" ({listed(names, MOST_NAMES)})" if names else ""
 
 
 def _worst_first(metrics: Mapping[str, Any]) -> list[str]:
