@@ -224,7 +224,7 @@ class _Training:
         begun = time.process_time()
         for _ in range(STEPS):
             request = BatchRequest(
-                step=self._step, rays=self._rays, surface_points=0, phase=0, loss_weights={}
+                step=self._step, rays=self._rays, surface_points=0, square=0, phase=0, loss_weights={}
             )
             batch = self._dataset[request]
             scene = self._network.scene(self._network.encode(batch.views, batch.hull), 0)

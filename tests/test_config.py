@@ -290,6 +290,21 @@ def test_labelled_points_need_a_hull() -> None:
     assert "but schedule.phases.1.loss_weights.occupancy reads labelled points" in message
 
 
+def test_the_perceptual_term_needs_squares_that_its_network_can_see() -> None:
+    message = problem("loss.perceptual.weight=0.1")
+    assert message.startswith(
+        "schedule.phases.0.square: found 0, but loss.perceptual looks at squares of rays in phase 0"
+    )
+    message = problem("schedule=perceptual_last", "schedule.phases.1.square=30")
+    assert (
+        message.startswith("schedule.phases.1.square: found 30,") and "expected at least 31 pixels" in message
+    )
+    message = problem("schedule=perceptual_last", "scale.image_size=16")
+    assert message.startswith("scale.image_size: found 16,")
+    compose_config(["schedule=perceptual_last"])
+    compose_config(["loss.perceptual.weight=0.1", "+schedule.phases.0.square=64"])
+
+
 def test_settings_without_effect_are_warned_of(conf: Path) -> None:
     for option in ("image_hull", "image_hull_section", "image_hull_section_consistency"):
         with pytest.warns(UserWarning, match=rf"features={option} reads the hull, but model\.hull=false"):

@@ -89,6 +89,8 @@ def test_counts_must_make_sense() -> None:
         Phase(rays=0, surface_points=0)
     with pytest.raises(ConfigError, match="surface_points"):
         Phase(rays=1, surface_points=-1)
+    with pytest.raises(ConfigError, match=r"square: found -1, expected 0 or more pixels"):
+        Phase(rays=1, surface_points=0, square=-1)
 
 
 def test_progress_is_the_larger_share_of_the_budget() -> None:

@@ -24,12 +24,14 @@ class Phase:
     Attributes:
         rays: Rays a step and process, of all characters of its batch together.
         surface_points: Surface points a step and process, of all its characters together; 0 trains by rays alone.
+        square: Side of a square of neighbouring rays that each character has besides, pixels; 0 for none.
         until: Where it ends: one of {share: of the run}, {steps: count}, {seconds: of training}; None: never.
         loss_weights: Weights of loss terms that this phase sets otherwise than `loss` does, by term.
     """
 
     rays: int
     surface_points: int
+    square: int = 0
     until: Mapping[str, float] | None = None
     loss_weights: Mapping[str, float] = field(default_factory=dict)
 
@@ -38,6 +40,8 @@ class Phase:
             raise ConfigError(f"rays: found {self.rays}, expected at least 1 ray a step.")
         if self.surface_points < 0:
             raise ConfigError(f"surface_points: found {self.surface_points}, expected 0 or more.")
+        if self.square < 0:
+            raise ConfigError(f"square: found {self.square}, expected 0 or more pixels.")
         if self.until is None:
             return
         if len(self.until) != 1 or not set(self.until) <= set(UNITS):

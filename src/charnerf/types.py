@@ -267,6 +267,7 @@ class TrainBatch(MovableRecord):
         rays: Target rays (B, R).
         rgb: Their colours on white, (B, R, 3).
         alpha: Their alpha, (B, R).
+        square: Side S of a square of neighbouring pixels, which the first S * S rays of each character are, row by row; 0 without.
         depth: Distance along the ray to the surface, (B, R), m, 0 where there is none; None where no loss
             reads it.
         surface: Points on the surface, or None where no loss reads them or a character has no mesh.
@@ -284,6 +285,7 @@ class TrainBatch(MovableRecord):
     rays: RayBundle
     rgb: Tensor
     alpha: Tensor
+    square: int
     depth: Tensor | None
     surface: SurfacePoints | None
     space: SpacePoints | None

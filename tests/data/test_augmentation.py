@@ -48,7 +48,7 @@ def batch(figure_dataset):
         store=store, characters=1, foreground_share=0.75,
         needs=Needs(depth=True, space_points=200), used_views=VIEWS, augmentation=lambda batch, _: batch, seed=5, share=Share(),
     )  # fmt: skip
-    return dataset[BatchRequest(step=0, rays=64, surface_points=300, phase=0, loss_weights={})]
+    return dataset[BatchRequest(step=0, rays=64, surface_points=300, square=0, phase=0, loss_weights={})]
 
 
 def tensors(record):

@@ -63,7 +63,9 @@ def dataset_of(store: CharacterStore, **changes) -> MixedDataset:
 
 
 def request(step: int = 0, *, rays: int = 64, surface_points: int = 0, **more) -> BatchRequest:
-    made = BatchRequest(step=step, rays=rays, surface_points=surface_points, phase=0, loss_weights={})
+    made = BatchRequest(
+        step=step, rays=rays, surface_points=surface_points, square=0, phase=0, loss_weights={}
+    )
     return replace(made, **more)
 
 
@@ -118,6 +120,40 @@ def test_what_pixels_are_drawn_by_draws_nothing_else(store):
     generator = torch.Generator().manual_seed(batch.seeds[0])
     again = one.foreground[torch.randint(len(one.foreground), (64,), generator=generator)]
     assert not torch.equal(on_white(one.images.reshape(-1, 4)[again].float() / 255.0), batch.rgb[0])
+
+
+def test_a_square_is_a_window_of_one_picture_around_the_character(store):
+    """Row by row, before the other rays; nowhere beyond a picture's edge."""
+    dataset, side = dataset_of(store), 16
+    for step in range(12):
+        batch = dataset[request(step, rays=10, square=side)]
+        assert batch.square == side and batch.rgb.shape == batch.rays.origins.shape == (
+            1,
+            side * side + 10,
+            3,
+        )
+        assert torch.equal(batch.rays.origins[0, : side * side].unique(dim=0), batch.rays.origins[0, :1])
+        one = store.open(batch.names[0])
+        pictures = on_white(one.images.float() / 255.0)
+        windows = (
+            pictures.unfold(1, side, 1).unfold(2, side, 1).movedim(3, -1)
+        )  # (N, rows, columns, side, side, 3)
+        square = batch.rgb[0, : side * side].reshape(side, side, 3)
+        image, top, left = (windows == square).flatten(3).all(-1).nonzero()[0].tolist()
+        camera = one.character.cameras[image]
+        places = pixel_centres(camera.width, camera.height)[top : top + side, left : left + side].reshape(
+            -1, 2
+        )
+        torch.testing.assert_close(
+            batch.rays.directions[0, : side * side], pixel_rays(camera, places).directions
+        )
+        assert (batch.alpha[0, : side * side] > 0.5).any()
+
+
+def test_a_square_larger_than_the_pictures_is_a_picture(store):
+    batch = dataset_of(store)[request(rays=10, square=64)]
+    height, width = store.open(batch.names[0]).images.shape[1:3]
+    assert batch.square == height == width and batch.rgb.shape[1] == height * width + 10
 
 
 def test_rays_carry_the_colors_that_the_figure_has(store):

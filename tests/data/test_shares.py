@@ -56,7 +56,9 @@ def dataset_of(store: CharacterStore, *, characters: int, share: Share = ALONE) 
 
 
 def request(step: int, *, times: int = 1) -> BatchRequest:
-    return BatchRequest(step=step, rays=24 * times, surface_points=16 * times, phase=0, loss_weights={})
+    return BatchRequest(
+        step=step, rays=24 * times, surface_points=16 * times, square=0, phase=0, loss_weights={}
+    )
 
 
 @pytest.mark.parametrize(("processes", "characters"), [(2, 1), (2, 2), (4, 1)])

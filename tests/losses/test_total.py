@@ -17,38 +17,8 @@ from charnerf.losses.surface import Surface
 from charnerf.losses.total import Pass, WeightedLosses
 from charnerf.scene import FunctionField
 from charnerf.schedule import Phase, PhaseSchedule
-from charnerf.types import (
-    Cameras,
-    FieldOutput,
-    RayBundle,
-    RenderOutput,
-    SourceViews,
-    SpacePoints,
-    SurfacePoints,
-    TrainBatch,
-)
-
-
-def batch(**changes) -> TrainBatch:
-    """Two rays, one surface point, two labelled points of one character."""
-    flags = torch.ones(1, 1, dtype=torch.bool)
-    cameras = Cameras(torch.eye(4)[None, None], torch.ones(1, 1, 2), torch.ones(1, 1, 2), flags, 2, 2)
-    made = TrainBatch(
-        names=("hero",),
-        views=SourceViews(torch.zeros(1, 1, 4, 2, 2), cameras, flags, ~flags),
-        hull=None,
-        rays=RayBundle(torch.zeros(1, 2, 3), torch.ones(1, 2, 3)),
-        rgb=torch.tensor((((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),)),
-        alpha=torch.tensor(((0.0, 1.0),)),
-        depth=torch.tensor(((0.0, 4.0),)),
-        surface=SurfacePoints(torch.zeros(1, 1, 3), torch.tensor((((0.5, 0.5, 0.5),),))),
-        space=SpacePoints(torch.zeros(1, 2, 3), torch.tensor(((1.0, 0.0),))),
-        phase=0,
-        loss_weights={},
-        step=0,
-        seeds=(0,),
-    )
-    return replace(made, **changes)
+from charnerf.types import FieldOutput, RenderOutput, TrainBatch
+from support.batches import small_batch
 
 
 def field(points: Tensor, directions: Tensor) -> FieldOutput:
@@ -102,7 +72,7 @@ BY_HAND = {
 def test_every_term_by_hand_and_their_weighted_sum():
     weights = {name: 0.1 * (k + 1) for k, name in enumerate(BY_HAND)}
     loss = losses(**weights)
-    total, values = add_up(loss, [answered()], batch())
+    total, values = add_up(loss, [answered()], small_batch())
     assert loss.names == tuple(values) == tuple(BY_HAND)
     for name, value in values.items():
         assert value.item() == pytest.approx(BY_HAND[name]), name
@@ -110,7 +80,7 @@ def test_every_term_by_hand_and_their_weighted_sum():
 
 
 def test_coarse_and_fine_add_up():
-    total, values = add_up(losses(reconstruction=2.0), [answered(), answered()], batch())
+    total, values = add_up(losses(reconstruction=2.0), [answered(), answered()], small_batch())
     assert values["reconstruction"].item() == 1.0 and total.item() == 2.0
 
 
@@ -123,7 +93,7 @@ def test_what_weighs_zero_reaches_neither_loss_nor_gradient():
         rgb=rgb,
         depth=torch.full((1, 2), torch.nan),
     )
-    total, values = add_up(losses(reconstruction=1.0, surface_rgb=1.0), [one], batch())
+    total, values = add_up(losses(reconstruction=1.0, surface_rgb=1.0), [one], small_batch())
     assert set(values) == {"reconstruction", "surface_rgb"}
     total.backward()
     assert total.isfinite() and poison.grad is None and rgb.grad.isfinite().all()
@@ -133,15 +103,17 @@ def test_a_field_is_not_queried_for_a_term_of_weight_zero():
     def refuses(points: Tensor, directions: Tensor) -> FieldOutput:
         raise AssertionError
 
-    add_up(losses(reconstruction=1.0, opacity=0.1, depth=0.1), [answered(refuses)], batch())
+    add_up(losses(reconstruction=1.0, opacity=0.1, depth=0.1), [answered(refuses)], small_batch())
 
 
 def test_a_phase_overrides_weights_both_ways():
     loss = losses(reconstruction=1.0, opacity=0.1)
-    total, values = add_up(loss, [answered()], batch(loss_weights={"opacity": 0.0, "surface_alpha": 2.0}))
+    total, values = add_up(
+        loss, [answered()], small_batch(loss_weights={"opacity": 0.0, "surface_alpha": 2.0})
+    )
     assert set(values) == {"reconstruction", "surface_alpha"}
     assert total.item() == pytest.approx(0.5 + 2.0 * 0.75)
-    again, _ = add_up(loss, [answered()], batch())
+    again, _ = add_up(loss, [answered()], small_batch())
     assert again.item() == pytest.approx(0.5 + 0.1 * 0.125)  # nothing of a phase stays
     assert loss.active({"opacity": 0.3}) == {"reconstruction": 1.0, "opacity": 0.3}
 
@@ -149,7 +121,7 @@ def test_a_phase_overrides_weights_both_ways():
 def test_terms_without_data_are_left_out():
     """A character without a mesh trains by its rays."""
     loss = losses(**dict.fromkeys(BY_HAND, 1.0))
-    total, values = add_up(loss, [answered()], batch(surface=None, space=None, depth=None))
+    total, values = add_up(loss, [answered()], small_batch(surface=None, space=None, depth=None))
     assert set(values) == {"reconstruction", "opacity"}
     assert total.item() == pytest.approx(0.625)
 

@@ -84,6 +84,7 @@ def batch_of(
         rays=every[flat][None],
         rgb=(rgba[:, :3] * rgba[:, 3:] + 1.0 - rgba[:, 3:])[None],
         alpha=rgba[:, 3][None],
+        square=0,
         depth=None,
         surface=None,
         space=None,

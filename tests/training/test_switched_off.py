@@ -110,6 +110,13 @@ def test_without_meshes_points_are_labelled_by_pictures_which_is_said_once(space
     assert all(isinstance(one.space, SilhouetteSpace) for one in run.data.train_store._open.values())
 
 
+def test_squares_are_drawn_and_compared_in_their_phase_alone(figure_dataset, tmp_path):
+    cfg = small_runs.smoke_config(figure_dataset, "schedule=perceptual_last", *ONE, "scale.steps=5")
+    run = small_runs.assemble(cfg, tmp_path / "run").fit()
+    assert [rays for _, _, rays, _ in run.recorder.batches] == [64] * 4 + [32 * 32 + 64]
+    assert run.module.logged["train/loss/perceptual"] > 0.0
+
+
 def test_without_a_hull_none_is_carved(figure_dataset, tmp_path):
     shutil.copytree(figure_dataset, tmp_path / "dataset")
     cfg = small_runs.smoke_config(tmp_path / "dataset", "model.hull=false", "features=image", *ONE)

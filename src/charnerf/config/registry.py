@@ -62,6 +62,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "loss": (
         f"{LOSSES}.depth.Depth",
         f"{LOSSES}.occupancy.Occupancy",
+        f"{LOSSES}.perceptual.Perceptual",
         f"{LOSSES}.opacity.Opacity",
         f"{LOSSES}.reconstruction.Reconstruction",
         f"{LOSSES}.surface.Surface",

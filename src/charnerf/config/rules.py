@@ -10,6 +10,7 @@ from charnerf.errors import ConfigError
 from charnerf.schedule import Phase, PhaseSchedule
 
 LONGEST_NAME = 120  # characters
+LEAST_SQUARE = 31  # pixels, of a square that AlexNet looks at: of smaller ones its last maps have no pixel
 
 Rule = Callable[..., Iterator[tuple[str, str]]]
 
@@ -88,6 +89,27 @@ def _labelled_points_lie_in_a_hull(
             yield "model.hull", f"found false, but {key} {reason}; set schedule=constant or model.hull=true."
 
 
+def _squares_are_drawn(
+    weight: float, phases: Sequence[Mapping[str, Any]], image_size: int
+) -> Iterator[tuple[str, str]]:
+    for index, phase in enumerate(phases):
+        square = phase.get("square", 0)
+        if (phase.get("loss_weights") or {}).get("perceptual", weight) <= 0:
+            continue
+        reason = f"but loss.perceptual looks at squares of rays in phase {index}, expected at least {LEAST_SQUARE} pixels"
+        if square < LEAST_SQUARE:
+            key = f"schedule.phases.{index}.square"
+            yield (
+                key,
+                f"found {square}, {reason}; set it (64), schedule=perceptual_last or loss.perceptual.weight=0.",
+            )
+        if image_size < LEAST_SQUARE:
+            yield (
+                "scale.image_size",
+                f"found {image_size}, {reason}; set schedule=constant and loss.perceptual.weight=0.",
+            )
+
+
 def _average_moves(decay: float | None) -> Iterator[tuple[str, str]]:
     if isinstance(decay, int | float) and decay >= 1:
         yield "averaging.decay", f"found {decay}, expected below 1: at 1 the average would never move."
@@ -112,6 +134,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("schedule.phases",), _phases_are_a_schedule),
     (("loss",), _some_term_counts),
     (("loss.occupancy.weight", "schedule.phases", "model.hull"), _labelled_points_lie_in_a_hull),
+    (("loss.perceptual.weight", "schedule.phases", "model.image_size"), _squares_are_drawn),
     (("averaging.decay",), _average_moves),
     _above_zero("combinator.lr_scale"),
     _above_zero("combinator.temperature"),

@@ -86,7 +86,11 @@ class MixedDataset(Dataset[TrainBatch]):
         drawn_here, drawn_later = (step_seed(self.seed, request.step, place, stream) for stream in (0, 1))
         generator = torch.Generator().manual_seed(drawn_here)
         one = self.store.open(name)
-        rays, rgb, alpha, depth = self._rays(one, _count_each(request.rays, self.characters), generator)
+        square = min(request.square, *one.images.shape[1:3])
+        pixels = self._pixels(one, _count_each(request.rays, self.characters), generator)
+        if square:
+            pixels = torch.cat((_square(one, square, generator), pixels))
+        rays, rgb, alpha, depth = self._rays(one, pixels)
         points = _count_each(surface_points, self.characters)
         batch = TrainBatch(
             names=(name,),
@@ -95,6 +99,7 @@ class MixedDataset(Dataset[TrainBatch]):
             rays=rays[None],
             rgb=rgb[None],
             alpha=alpha[None],
+            square=square,
             depth=depth[None] if self.needs.depth else None,
             surface=one.surface.sample(points, generator) if points and one.surface is not None else None,
             space=self._space(one, generator),
@@ -105,12 +110,9 @@ class MixedDataset(Dataset[TrainBatch]):
         )
         return self.augmentation(batch, generator)
 
-    def _rays(
-        self, one: OpenCharacter, num_rays: int, generator: torch.Generator
-    ) -> tuple[RayBundle, Tensor, Tensor, Tensor]:
-        """Rays with colour, alpha and depth of one character."""
+    def _rays(self, one: OpenCharacter, flat: Tensor) -> tuple[RayBundle, Tensor, Tensor, Tensor]:
+        """Rays with colour, alpha and depth through pixels (R,) of one character."""
         height, width = one.images.shape[1:3]
-        flat = self._pixels(one, num_rays, generator)
         image, rest = flat // (height * width), flat % (height * width)
         pixels = torch.stack((rest % width + 0.5, rest // width + 0.5), dim=-1)
         rgba = one.images.reshape(-1, 4)[flat].float() / 255.0
@@ -146,6 +148,18 @@ class MixedDataset(Dataset[TrainBatch]):
         if self.needs.space_points == 0 or one.space is None:
             return None
         return one.space.sample(_count_each(self.needs.space_points, self.characters), generator)
+
+
+def _square(one: OpenCharacter, side: int, generator: torch.Generator) -> Tensor:
+    """Flat indices (side * side,) of a square of pixels around one that shows the character, moved into its picture."""
+    height, width = one.images.shape[1:3]
+    centres = one.foreground if len(one.foreground) else torch.arange(one.images.shape[:3].numel())
+    centre = int(centres[int(torch.randint(len(centres), (), generator=generator))])
+    image, row, column = centre // (height * width), centre // width % height, centre % width
+    top = min(max(row - side // 2, 0), height - side)
+    left = min(max(column - side // 2, 0), width - side)
+    rows, columns = torch.arange(top, top + side), torch.arange(left, left + side)
+    return ((image * height + rows[:, None]) * width + columns).reshape(-1)
 
 
 def stack_batches(

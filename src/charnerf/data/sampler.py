@@ -35,6 +35,7 @@ class BatchRequest:
         step: Index of the batch in the run; seeds everything random in it.
         rays: Rays a process, of all its characters together.
         surface_points: Surface points a process, of all its characters together.
+        square: Side of the square of neighbouring rays that each character has besides, pixels; 0 for none.
         phase: Index of the phase.
         loss_weights: Loss weights that the phase overrides.
     """
@@ -42,6 +43,7 @@ class BatchRequest:
     step: int
     rays: int
     surface_points: int
+    square: int
     phase: int
     loss_weights: Mapping[str, float]
 
@@ -95,6 +97,7 @@ class PhaseSampler(Sampler[BatchRequest]):
                 step=now.step,
                 rays=phase.rays,
                 surface_points=phase.surface_points,
+                square=phase.square,
                 phase=index,
                 loss_weights=phase.loss_weights,
             )

@@ -10,8 +10,9 @@ from torch import Tensor
 from charnerf.checks import check_finite
 from charnerf.evaluation import metrics
 from charnerf.evaluation.angles import Record, mean_of, mean_over_characters
-from charnerf.evaluation.lpips import LEAST_SIDE, Lpips
+from charnerf.evaluation.lpips import Lpips
 from charnerf.evaluation.surface_error import SURFACE_KEYS
+from charnerf.losses.alex_lpips import LEAST_SIDE
 from charnerf.pictures import on_white
 from charnerf.types import RenderOutput
 
