@@ -39,23 +39,29 @@ def cross_sections(hull: Hull) -> CrossSections:
     Args:
         hull: One character's, (no B axis).
     """
-    side = hull.occupancy.shape[-1] // POOL
-    occupied = F.max_pool3d(hull.occupancy[None].to(torch.float32), POOL)[0] > 0
+    occupied = _pooled(hull.occupancy)
+    side = occupied.shape[-1]
     cell = (hull.box_max - hull.box_min) / side
     numbers = torch.arange(side, dtype=cell.dtype, device=occupied.device)
-    middles, halves = [], []
+    grid = cell.new_zeros((7, side, side, side))
+    grid[6] = inside = occupied.to(cell.dtype)
     for axis in range(3):
         number = numbers.view([-1 if a == axis else 1 for a in range(3)])
         before = torch.where(occupied, -1.0, number).cummax(axis).values
         after = torch.where(occupied, float(side), number).flip(axis).cummin(axis).values.flip(axis)
-        middles.append(hull.box_min[axis] + 0.5 * (before + after + 1.0) * cell[axis])
-        halves.append(0.5 * (after - before - 1.0) * cell[axis])
-    inside = occupied.to(cell.dtype)
-    return CrossSections(
-        grid=torch.cat((torch.stack((*middles, *halves)) * inside, inside[None])),
-        box_min=hull.box_min,
-        box_max=hull.box_max,
-    )
+        middle = hull.box_min[axis] + 0.5 * (before + after + 1.0) * cell[axis]
+        half = 0.5 * (after - before - 1.0) * cell[axis]
+        torch.mul(middle, inside, out=grid[axis])
+        torch.mul(half, inside, out=grid[axis + 3])
+    return CrossSections(grid=grid, box_min=hull.box_min, box_max=hull.box_max)
+
+
+def _pooled(occupancy: Tensor) -> Tensor:
+    """Whether any cell (G, G, G) in one of the cross-sections' grid is occupied, (g, g, g) bool; each training step asks."""
+    for axis in range(3):
+        first, second = occupancy.unflatten(axis, (-1, POOL)).unbind(axis + 1)
+        occupancy = first | second
+    return occupancy
 
 
 def read_cross_sections(sections: CrossSections, points: Tensor) -> tuple[Tensor, Tensor]:
