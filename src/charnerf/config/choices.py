@@ -19,10 +19,12 @@ def check_choice(override: Override) -> None:
         ConfigError: If a group of one part is set to several, or a list holds what is no name, or one twice.
     """
     group, value = override.key_or_group, override.value()
-    options = options_in(group)
-    if not options or override.is_delete() or isinstance(value, str):
+    if "." in group or isinstance(value, str) or override.is_delete():  # a key's value, or one option
         return
-    if group not in LIST_GROUPS and value is None:
+    if value is None and group not in LIST_GROUPS:
+        return
+    options = options_in(group)
+    if not options:
         return
     listed = value if group in LIST_GROUPS and isinstance(value, list) else [value]
     if not all(isinstance(one, str) for one in listed):
