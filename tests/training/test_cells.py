@@ -1,12 +1,11 @@
 """Cells of a grid: finished ones are skipped, killed ones go on, failed ones are recorded."""
 
 import json
+import multiprocessing
 import os
 import shutil
-import subprocess
-import sys
-import textwrap
 import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -111,35 +110,26 @@ def test_hydras_notes_and_the_log_go_along(tmp_path):
     assert report_grid(tmp_path / "nothing") is None
 
 
-KILLED = """
-    import os, signal, sys
-    from pathlib import Path
-    from omegaconf import OmegaConf
-    from charnerf.training.cells import run_cell
+def _in_work(grid: Path, tell: Connection) -> None:
+    def train(cfg: DictConfig, folder: Path) -> None:
+        tell.send("begun")
+        tell.recv()
 
-    def train(cfg, folder):
-        print("begun", flush=True)
-        sys.stdin.readline()
-
-    cfg = OmegaConf.create({"name": "run", "ckpt_path": None, "seed": 0})
-    run_cell(cfg, Path(sys.argv[1]), name="seed-0", job_folder=Path(sys.argv[1]), train=train)
-"""
+    run_cell(config(), grid, name="seed-0", job_folder=grid, train=train)
 
 
 def test_a_cell_in_work_is_left_alone_and_a_killed_one_is_not(tmp_path):
-    process = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == b"begun\n"
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe()
+    process = context.Process(target=_in_work, args=(tmp_path, there))
+    process.start()
+    assert here.recv() == "begun"
     trainer = Trainer()
     assert cell(tmp_path, trainer).state == "running"
     assert [one.state for one in cells_of(tmp_path)] == ["running"]
     assert [one.state for one in read_unfinished(tmp_path)] == ["running"]
     process.kill()
-    process.wait()
+    process.join()
     assert [one.state for one in cells_of(tmp_path)] == ["interrupted"]
     assert [one.state for one in read_unfinished(tmp_path)] == ["interrupted"]
     with pytest.raises(GridError, match="interrupted"):

@@ -17,6 +17,7 @@ from charnerf.interruption import Stopped, held, listening
 from charnerf.training import run
 from charnerf.training.cells import cells_of
 from support import small_runs
+from support.processes import begin_command
 
 SMALL = ("encoder=single", "schedule=two_phase", "scale.steps=8", "validation.times=2")
 
@@ -114,11 +115,14 @@ def test_a_run_that_is_stopped_in_its_evaluation_is_trained(figure_dataset, tmp_
     assert done == ["again"]
 
 
-def start(dataset: Path, folder: Path, *more: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "charnerf", "train", "scale=smoke", "trainer=cpu", "data=folder"]
+def command(dataset: Path, folder: Path, *more: str) -> list[str]:
     settings = [f"data.root={dataset}", "validation.views=1", f"hydra.run.dir={folder}", *more]
+    return ["train", "scale=smoke", "trainer=cpu", "data=folder", *settings]
+
+
+def start(dataset: Path, folder: Path, *more: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [*command, *settings],
+        [sys.executable, "-m", "charnerf", *command(dataset, folder, *more)],
         env={**os.environ, "OMP_NUM_THREADS": "1"},
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -150,14 +154,18 @@ def is_alive(process: int) -> bool:
 def test_the_command_ends_with_its_status_and_its_workers(figure_dataset, tmp_path, number, status):
     """The whole group of processes gets the signal, as from a terminal or a queue."""
     long = ("scale.steps=100000", "validation.times=20000", "batches.workers=1")
-    process = start(figure_dataset, tmp_path / "run", *long)
-    last = tmp_path / "run/checkpoints/last.ckpt"
-    await_file(process, last)
+    log, last = tmp_path / "log", tmp_path / "run/checkpoints/last.ckpt"
+    process = begin_command(command(figure_dataset, tmp_path / "run", *long), log)
+    end = time.monotonic() + 300
+    while not last.is_file():
+        assert process.is_alive() and time.monotonic() < end, log.read_text()
+        time.sleep(0.05)
     workers = children(process.pid)
     os.killpg(process.pid, number)
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == status, err.decode()
-    assert str(last) in out.decode() + err.decode() and b"Traceback" not in err
+    process.join(120)
+    said = log.read_text()
+    assert process.exitcode == status, said
+    assert workers and str(last) in said and "Traceback" not in said
     assert read_checkpoint(last)["global_step"] >= 5
     assert not any(is_alive(worker) for worker in workers)
 
