@@ -18,7 +18,7 @@ from charnerf.errors import DataError, NumericalError
 from charnerf.geometry.bounds import Bounds
 from charnerf.geometry.hull import build_hull
 from charnerf.meshing.exported import read_texture
-from charnerf.reconstruction.folder import reconstruct
+from charnerf.reconstruction.folder import Reconstruction, reconstruct
 from support.egg_model import BOX, MESH, OPTIONS, FakeModel, draw_eggs
 
 
@@ -27,9 +27,16 @@ def drawings(tmp_path) -> dict[str, Path]:
     return draw_eggs(tmp_path)
 
 
-def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
-    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
-    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+@pytest.fixture(scope="module")
+def done(tmp_path_factory) -> Reconstruction:
+    """The egg's, in a folder that is only read."""
+    folder = tmp_path_factory.mktemp("egg")
+    return reconstruct(FakeModel(), folder / "out", OPTIONS, turnaround(**draw_eggs(folder)))
+
+
+def test_folder_is_complete_and_true_to_the_field(done):
+    out = done.mesh.parent
+    names = sorted(path.name for path in out.iterdir())
     assert names == [
         "drawings.png",
         "mesh.glb",
@@ -41,23 +48,22 @@ def test_folder_is_complete_and_true_to_the_field(tmp_path, drawings):
         done.turntable.name,
         "views",
     ]
-    assert Image.open(tmp_path / "out" / "sheet.png").size == (8 * 48, 2 * (48 + 20) + 12)
-    assert Image.open(tmp_path / "out" / "meshes" / "mesh_sheet.png").width > 1000
+    assert Image.open(out / "sheet.png").size == (8 * 48, 2 * (48 + 20) + 12)
+    assert Image.open(out / "meshes" / "mesh_sheet.png").width > 1000
     assert sorted(v.name for v in done.views) == [f"{60 * k:03d}.png" for k in range(6)]
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
     np.testing.assert_allclose(mesh.bounds[:, 1], (0.0, 2.0), atol=1e-6)  # Y up
     assert mesh.extents[0] == pytest.approx(1.0, abs=0.06)
     assert len(mesh.faces) <= 600
-    front = np.asarray(Image.open(tmp_path / "out" / "views" / "000.png"))[24, 24]
-    back = np.asarray(Image.open(tmp_path / "out" / "views" / "180.png"))[24, 24]
+    front = np.asarray(Image.open(out / "views" / "000.png"))[24, 24]
+    back = np.asarray(Image.open(out / "views" / "180.png"))[24, 24]
     assert front[0] > 200 and front[1] < 60 and front[3] > 240
     assert back[1] > 180 and back[0] < 60
     assert iio.imread(done.turntable).shape == (6, 48, 48, 3)
 
 
-def test_the_mesh_wears_the_drawings(tmp_path, drawings):
+def test_the_mesh_wears_the_drawings(done, tmp_path, drawings):
     """The field is red in front and green behind; the side drawing is orange, which the field never is."""
-    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
     mesh = trimesh.load(done.mesh, force="mesh", process=False)
     uv = np.asarray(mesh.visual.uv)
     colors = read_texture(mesh.visual.material.baseColorTexture, uv)
@@ -69,8 +75,7 @@ def test_the_mesh_wears_the_drawings(tmp_path, drawings):
     assert trimesh.load(plain.mesh, force="mesh").visual.material.baseColorTexture is None
 
 
-def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
-    done = reconstruct(FakeModel(), tmp_path / "out", OPTIONS, turnaround(**drawings))
+def test_report_says_what_was_assumed_made_and_how_long(done):
     text = done.report.with_suffix(".md").read_text()
     for words in (
         "floor line",
@@ -81,7 +86,7 @@ def test_report_says_what_was_assumed_made_and_how_long(tmp_path, drawings):
         "weights.safet",
     ):
         assert words in text
-    facts = json.loads((tmp_path / "out" / "report.json").read_text())
+    facts = json.loads((done.report.with_suffix(".json")).read_text())
     assert (
         facts["quality"] == json.loads(json.dumps(done.quality.facts()))
         and facts["seconds"].keys() == done.seconds.keys()

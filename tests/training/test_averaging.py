@@ -27,12 +27,26 @@ class WeightsOfSteps(small_runs.L.Callback):
             self.validated.append(small_runs.weights(pl_module.model).clone())
 
 
-def watched(cfg, folder, **options):
-    run = small_runs.assemble(cfg, folder, **options)
+def watched(cfg, folder):
+    run = small_runs.assemble(cfg, folder)
     watch = WeightsOfSteps()
     run.trainer.callbacks.insert(0, watch)
     start = small_runs.weights(run.module.model).clone()
-    return run, watch, start
+    return run.fit(), watch, start
+
+
+@pytest.fixture(scope="module")
+def averaged(figure_dataset, tmp_path_factory):
+    """A run with an average, what was seen of it, its weights at the start and its folder."""
+    folder = tmp_path_factory.mktemp("averaged")
+    return *watched(small_runs.smoke_config(figure_dataset, *AVERAGED), folder), folder
+
+
+@pytest.fixture(scope="module")
+def plain(figure_dataset, tmp_path_factory):
+    """The same run without, and its folder."""
+    folder = tmp_path_factory.mktemp("plain")
+    return small_runs.assemble(small_runs.smoke_config(figure_dataset, *STEPS), folder).fit(), folder
 
 
 def averages(start, trained):
@@ -45,41 +59,45 @@ def averages(start, trained):
     return found
 
 
-def test_the_average_is_validated_and_saved_and_does_not_change_training(figure_dataset, tmp_path):
-    run, watch, start = watched(small_runs.smoke_config(figure_dataset, *AVERAGED), tmp_path / "run")
-    run.fit()
-    plain = small_runs.assemble(small_runs.smoke_config(figure_dataset, *STEPS), tmp_path / "plain").fit()
-    assert run.recorder.losses == plain.recorder.losses
+def test_the_average_is_validated_and_saved_and_does_not_change_training(averaged, plain):
+    run, watch, start, folder = averaged
+    without, _ = plain
+    assert run.recorder.losses == without.recorder.losses
     expected = averages(start, watch.trained)
-    assert torch.equal(small_runs.weights(plain.module.model), watch.trained[-1])
+    assert torch.equal(small_runs.weights(without.module.model), watch.trained[-1])
     torch.testing.assert_close(small_runs.weights(run.module.model), expected[-1])
     for seen, average in zip(watch.validated, expected[1::2], strict=True):
         torch.testing.assert_close(seen, average)
-    saved = torch.load(tmp_path / "run/checkpoints/last.ckpt", weights_only=True)["state_dict"]
+    saved = torch.load(folder / "checkpoints/last.ckpt", weights_only=True)["state_dict"]
     state = {f"model.{name}": value for name, value in run.module.model.state_dict().items()}
     assert saved.keys() == state.keys()
     assert all(torch.equal(saved[name], state[name]) for name in saved)
 
 
-def test_a_resumed_run_has_the_same_average(figure_dataset, tmp_path):
+def before_the_last(folder):
+    """The checkpoint of four of six steps."""
+    checkpoint = folder / "checkpoints/previous.ckpt"
+    content = torch.load(checkpoint, weights_only=True)
+    assert content["global_step"] == 4
+    return checkpoint, content["state_dict"]
+
+
+def test_a_resumed_run_has_the_same_average(averaged, figure_dataset, tmp_path):
+    straight, _, _, folder = averaged
     cfg = small_runs.smoke_config(figure_dataset, *AVERAGED)
-    straight = small_runs.assemble(cfg, tmp_path / "straight").fit()
-    with pytest.raises(ConnectionAbortedError):
-        small_runs.assemble(cfg, tmp_path / "cut", cut_at=5).fit()
-    resumed = small_runs.assemble(cfg, tmp_path / "resumed").fit(tmp_path / "cut/checkpoints/last.ckpt")
+    resumed = small_runs.assemble(cfg, tmp_path).fit(before_the_last(folder)[0])
     assert resumed.recorder.losses == straight.recorder.losses[4:]
     assert torch.equal(small_runs.weights(resumed.module.model), small_runs.weights(straight.module.model))
     average = next(one for one in resumed.trainer.callbacks if isinstance(one, WeightAverage))
     assert average._average_model.n_averaged == 1 + 6  # the start, then every step
 
 
-def test_a_run_without_an_average_goes_on_with_one_from_its_weights(figure_dataset, tmp_path):
-    cfg = small_runs.smoke_config(figure_dataset, *STEPS)
-    with pytest.raises(ConnectionAbortedError):
-        small_runs.assemble(cfg, tmp_path / "cut", cut_at=5).fit()
-    checkpoint = tmp_path / "cut/checkpoints/last.ckpt"
-    held = torch.load(checkpoint, weights_only=True)["state_dict"]
-    run, watch, _ = watched(small_runs.smoke_config(figure_dataset, *AVERAGED), tmp_path / "on")
+def test_a_run_without_an_average_goes_on_with_one_from_its_weights(plain, figure_dataset, tmp_path):
+    checkpoint, held = before_the_last(plain[1])
+    cfg = small_runs.smoke_config(figure_dataset, *AVERAGED)
+    run = small_runs.assemble(cfg, tmp_path)
+    watch = WeightsOfSteps()
+    run.trainer.callbacks.insert(0, watch)
     start = torch.cat([held[f"model.{name}"].reshape(-1) for name, _ in run.module.model.named_parameters()])
     run.fit(checkpoint)
     torch.testing.assert_close(small_runs.weights(run.module.model), averages(start, watch.trained)[-1])

@@ -2,6 +2,7 @@
 
 import logging
 import multiprocessing
+import shutil
 import sys
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -30,6 +31,22 @@ SMALL = ("encoder=single", "scale.steps=4", "validation.times=4")
 def no_finish(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs end with their training."""
     monkeypatch.setattr(run_module, "finish_run", lambda *_, **__: None)
+
+
+@pytest.fixture(scope="module")
+def done_run(figure_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the smallest settings; read only."""
+    folder = tmp_path_factory.mktemp("done") / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "finish_run", lambda *_, **__: None)
+        run_training(small_runs.smoke_config(figure_dataset, *SMALL), folder)
+    return folder
+
+
+@pytest.fixture
+def my_run(done_run: Path, tmp_path: Path) -> Path:
+    """The same, to go on with."""
+    return shutil.copytree(done_run, tmp_path / "run")
 
 
 def write_steps(folder: Path, last: int, previous: int | None = None) -> Path:
@@ -95,25 +112,23 @@ def test_a_new_run_takes_no_folder_of_another(tmp_path, there):
         find_checkpoint(None, tmp_path)
 
 
-def test_a_run_keeps_its_last_two_and_says_whose_they_are(figure_dataset, tmp_path, no_finish):
-    cfg = small_runs.smoke_config(figure_dataset, *SMALL)
-    run_training(cfg, tmp_path)
-    steps = {file.name: read_checkpoint(file)["global_step"] for file in (tmp_path / "checkpoints").iterdir()}
+def test_a_run_keeps_its_last_two_and_says_whose_they_are(figure_dataset, my_run, no_finish):
+    steps = {file.name: read_checkpoint(file)["global_step"] for file in (my_run / "checkpoints").iterdir()}
     assert (steps["last.ckpt"], steps["previous.ckpt"]) == (4, 3)
     assert set(steps) == {"last.ckpt", "previous.ckpt", "best.ckpt"}
-    run = read_checkpoint(tmp_path / "checkpoints/last.ckpt")["charnerf"]
+    run = read_checkpoint(my_run / "checkpoints/last.ckpt")["charnerf"]
     assert run["format"] == "charnerf-checkpoint-1" and set(run["data"]) == {"train", "val"}
     assert run["config"]["scale.width"] == 16
 
-    config = (tmp_path / "config.yaml").read_text()
+    config = (my_run / "config.yaml").read_text()
     other = small_runs.smoke_config(
         figure_dataset, *SMALL, "ckpt_path=last", "batches.foreground_share=0.7", "seed=1"
     )
     with pytest.raises(ConfigError, match=r"of a run with settings of its own") as error:
-        run_training(other, tmp_path)
+        run_training(other, my_run)
     keys = [line.split(":")[0].strip() for line in str(error.value).splitlines()[1:]]
     assert keys == ["batches.foreground_share", "seed"]
-    assert (tmp_path / "config.yaml").read_text() == config  # of the state that is there
+    assert (my_run / "config.yaml").read_text() == config  # of the state that is there
 
     free = (
         "budget.steps=5",
@@ -122,27 +137,25 @@ def test_a_run_keeps_its_last_two_and_says_whose_they_are(figure_dataset, tmp_pa
         "name=other",
         "scale.eval_views=1",
     )
-    run_training(small_runs.smoke_config(figure_dataset, *SMALL, "ckpt_path=last", *free), tmp_path)
-    assert read_checkpoint(tmp_path / "checkpoints/last.ckpt")["global_step"] == 5
-    assert load_config(tmp_path).budget.steps == 5
+    run_training(small_runs.smoke_config(figure_dataset, *SMALL, "ckpt_path=last", *free), my_run)
+    assert read_checkpoint(my_run / "checkpoints/last.ckpt")["global_step"] == 5
+    assert load_config(my_run).budget.steps == 5
 
 
-def test_the_order_of_augmentations_is_a_setting(figure_dataset, tmp_path, no_finish):
-    cfg = small_runs.smoke_config(figure_dataset, *SMALL, "augmentation=[recolor,mirror]")
-    small = small_runs.smoke_config(figure_dataset, *SMALL, "augmentation=[mirror,recolor]", "ckpt_path=last")
-    run_training(cfg, tmp_path)
+def test_the_order_of_augmentations_is_a_setting(figure_dataset, my_run, no_finish):
+    """Of the default's, which is the run's."""
+    cfg = small_runs.smoke_config(figure_dataset, *SMALL, "augmentation=[mirror,recolor]", "ckpt_path=last")
     with pytest.raises(ConfigError, match=r"augmentation: found mirror recolor, expected recolor mirror"):
-        run_training(small, tmp_path)
+        run_training(cfg, my_run)
 
 
-def test_another_data_set_is_refused_wherever_it_lies(figure_dataset, tmp_path, no_finish):
-    run_training(small_runs.smoke_config(figure_dataset, *SMALL), tmp_path / "run")
+def test_another_data_set_is_refused_wherever_it_lies(my_run, tmp_path, no_finish):
     generate_dataset(tmp_path / "set", 1, 1, 1, seed=5, views=2, size=32, processes=1)
     cfg = small_runs.smoke_config(tmp_path / "set", *SMALL, "ckpt_path=last")
     with pytest.raises(
         ConfigError, match=r"a data set of its own.*\n  digest of split train: found \w+, expected"
     ):
-        run_training(cfg, tmp_path / "run")
+        run_training(cfg, my_run)
 
 
 def test_a_checkpoint_that_does_not_say_whose_it_is_begins_nothing(figure_dataset, tmp_path, no_finish):
@@ -174,17 +187,12 @@ def test_what_was_typed_is_kept_once_a_run_is_accepted(figure_dataset, tmp_path,
     assert {file.name: file.read_text() for file in (tmp_path / ".hydra").iterdir()} == kept
 
 
-def test_a_run_that_goes_on_from_the_one_before_ends_as_the_straight_one(figure_dataset, tmp_path, no_finish):
-    cfg = small_runs.smoke_config(figure_dataset, *SMALL)
-    run_training(cfg, tmp_path / "straight")
-    run_training(cfg, tmp_path / "broken")
-    flip(tmp_path / "broken/checkpoints/last.ckpt")
-    cfg.ckpt_path = "last"
-    run_training(cfg, tmp_path / "broken")
-    ends = [
-        read_checkpoint(tmp_path / name / "checkpoints/last.ckpt")["state_dict"]
-        for name in ("straight", "broken")
-    ]
+def test_a_run_that_goes_on_from_the_one_before_ends_as_the_straight_one(
+    figure_dataset, done_run, my_run, no_finish
+):
+    flip(my_run / "checkpoints/last.ckpt")
+    run_training(small_runs.smoke_config(figure_dataset, *SMALL, "ckpt_path=last"), my_run)
+    ends = [read_checkpoint(folder / "checkpoints/last.ckpt")["state_dict"] for folder in (done_run, my_run)]
     assert all(torch.equal(value, ends[1][key]) for key, value in ends[0].items())
 
 
