@@ -13,9 +13,10 @@ from charnerf.drawings.sheet import find_figures
 from charnerf.drawings.turnaround import read_views
 from charnerf.drawings.viewpoints import Viewpoint, between_square_ones, viewpoint
 from charnerf.errors import DataError
-from support.painted import paint
+from support.painted import SCALE, paint
 
 PAPER = (250, 247, 238)
+EYE = 0.045 * SCALE
 
 
 def figure(view: str, height: int) -> Image.Image:
@@ -24,18 +25,22 @@ def figure(view: str, height: int) -> Image.Image:
     draw = ImageDraw.Draw(picture)
     if view == "front":
         for x in (-0.1, 0.1):
-            middle, down = (1.3 + x) * 400, (1.3 + 1.0 - 1.8) * 400
-            draw.ellipse((middle - 18, down - 18, middle + 18, down + 18), fill=(20, 60, 30, 255))
+            middle, down = (1.3 + x) * SCALE, (1.3 + 1.0 - 1.8) * SCALE
+            draw.ellipse((middle - EYE, down - EYE, middle + EYE, down + EYE), fill=(20, 60, 30, 255))
     if view in ("side", "right"):
         draw.ellipse(
-            ((1.3 - 0.16) * 400, 0.5 * 400 - 18, (1.3 - 0.07) * 400, 0.5 * 400 + 18), fill=(20, 60, 30, 255)
+            ((1.3 - 0.16) * SCALE, 0.5 * SCALE - EYE, (1.3 - 0.07) * SCALE, 0.5 * SCALE + EYE),
+            fill=(20, 60, 30, 255),
         )
         draw.rectangle(
-            ((1.3 - 0.3) * 400, 2.2 * 400, (1.3 - 0.1) * 400, 2.3 * 400), fill=(70, 40, 30, 255)
+            ((1.3 - 0.3) * SCALE, 2.2 * SCALE, (1.3 - 0.1) * SCALE, 2.3 * SCALE), fill=(70, 40, 30, 255)
         )  # toes
     if view == "back":
         draw.pieslice(
-            ((1.3 - 0.25) * 400, 0.3 * 400, (1.3 + 0.25) * 400, 0.8 * 400), 0, 360, fill=(90, 50, 20, 255)
+            ((1.3 - 0.25) * SCALE, 0.3 * SCALE, (1.3 + 0.25) * SCALE, 0.8 * SCALE),
+            0,
+            360,
+            fill=(90, 50, 20, 255),
         )
     if view == "right":
         picture = picture.transpose(Image.Transpose.FLIP_LEFT_RIGHT)

@@ -14,7 +14,7 @@ from charnerf.errors import DataError
 from charnerf.geometry.cameras import angles_from_direction, project
 from charnerf.reconciling.agreement import iou
 from charnerf.wording import worded_for_page
-from support.painted import cropped, noisy_paper, on_background, paint
+from support.painted import SCALE, cropped, noisy_paper, on_background, paint
 
 VIEWS = ("front", "side", "back")
 SIZE = 128
@@ -112,8 +112,8 @@ def test_jpeg_files_are_cut_out(reference, tmp_path):
 def test_enclosed_white_stays_and_open_white_goes():
     """The white shirt is part of the figure, the gap between the legs is not."""
     rgba = cut_out(drawing_from_array(np.asarray(on_background(paint("front"))), "front")).rgba
-    shirt, gap = (1.0 + 1.3 - 1.15) * 400, (1.0 + 1.3 - 0.4) * 400
-    middle = round(1.3 * 400)
+    shirt, gap = (1.0 + 1.3 - 1.15) * SCALE, (1.0 + 1.3 - 0.4) * SCALE
+    middle = round(1.3 * SCALE)
     assert rgba[round(shirt), middle, 3] == 1.0
     assert rgba[round(gap), middle, 3] == 0.0
 

@@ -3,7 +3,7 @@
 import numpy as np
 from PIL import Image, ImageDraw
 
-SCALE = 400  # pixels a metre
+SCALE = 200  # pixels a metre
 SIDE = 2.6  # metres of the canvas
 MIDDLE = SIDE / 2
 
