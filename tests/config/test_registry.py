@@ -11,6 +11,7 @@ import lightning
 import pytest
 import torch.optim
 import yaml
+from omegaconf import DictConfig, OmegaConf
 
 import charnerf
 from charnerf.config import targets, validate
@@ -139,10 +140,18 @@ def test_a_value_is_never_a_part(hint: Any, name: str) -> None:
         "schedule.phases=[{_target_: charnerf.schedule.PhaseSchedule, phases: []}]",
     ],
 )
-def test_slots_take_classes_of_their_own_group_alone(override: str) -> None:
-    key = override.lstrip("+").partition("=")[0].partition("._")[0]
-    with pytest.raises(ConfigError, match=rf"{key}.*: "):
-        compose_config(["scale=smoke", override])
+def test_slots_take_classes_of_their_own_group_alone(override: str, smoke: DictConfig) -> None:
+    name, _, value = override.lstrip("+").partition("=")
+    cfg = smoke.copy()
+    OmegaConf.update(cfg, name, yaml.safe_load(value), force_add=True)
+    with pytest.raises(ConfigError, match=rf"{name.partition('._')[0]}.*: "):
+        validate(cfg)
+
+
+@pytest.fixture(scope="module")
+def smoke() -> DictConfig:
+    """Read only: to be copied."""
+    return compose_config(["scale=smoke"])
 
 
 def test_own_classes_stand_in_the_right_slots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
