@@ -1,6 +1,7 @@
 """Colours from drawings finer than those that are encoded."""
 
 from dataclasses import replace
+from functools import cache
 
 import pytest
 import torch
@@ -14,6 +15,7 @@ from support import helpers, tiny_models
 SMALL, LARGE = 32, 128
 
 
+@cache
 def striped(size: int) -> SourceViews:
     """A ball's drawings with stripes one pixel of 128 wide; at 32 they are grey."""
     views = helpers.source_views(helpers.ball(), helpers.source_cameras(size=size))
