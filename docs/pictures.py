@@ -1,4 +1,4 @@
-"""Make the pictures of docs/gallery.md and the examples of the page: `python -m docs.pictures --meshes FOLDER --drawn FOLDER`.
+"""Make README.md's picture, those of docs/gallery.md and the examples of the page: `python -m docs.pictures --meshes FOLDER --drawn FOLDER`.
 
 FOLDER/NAME.glb and FOLDER/NAME/VIEW.png are the characters that docs/gallery/pictures.csv names; they stay where they are. Without
 one of the options its picture is left as it is.
@@ -43,10 +43,17 @@ def main() -> None:
     with (FOLDER / "pictures.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     model = charnerf.load()
-    for kind, place in {"embedded": Path(), "real": options.meshes, "drawn": options.drawn}.items():
+    places = {
+        "embedded": Path(),
+        "readme": options.meshes,
+        "real": options.meshes,
+        "drawn": options.drawn,
+    }
+    for kind, place in places.items():
         if place is not None:
             found = [drawings(place, row) for row in rows if row["picture"] == kind]
-            sheet(model, found).quantize(COLORS).save(FOLDER / f"{kind}.png", optimize=True)
+            file = FOLDER.parent / "gallery.png" if kind == "readme" else FOLDER / f"{kind}.png"
+            sheet(model, found).quantize(COLORS).save(file, optimize=True)
     write_examples(Path(charnerf.__file__).parent / "app" / "examples")
 
 

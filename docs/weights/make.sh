@@ -57,15 +57,18 @@ capture test test
 capture variants "train train_extra chibi more" --views 24 --variants 3 --seed 1
 capture swaps "train train_extra chibi more" --views 24 --swaps 6 --seed 1
 
-run="$folder/run"
-resume=()
-[ -e "$run/checkpoints/last.ckpt" ] && resume=("ckpt_path=$run/checkpoints/last.ckpt")
-python train.py data=folder "data.root=$data" \
-  'splits.train=[train,train_extra,chibi,train,train_extra,chibi,more,more,more,variants,swaps,embedded]' \
-  features=image_hull_section_consistency encoder.coarse_width=64 encoder.coarse_channels=64 'augmentation=[stretch,recolor,mirror]' \
-  augmentation.recolor.share=0.7 augmentation.stretch.share=0.8 averaging.decay=0.998 batches.foreground_share=0.65 \
-  budget.seconds=3960 batches.memory_mib=16000 \
-  "hydra.run.dir=$run" "${resume[@]}" "$@"
+trained() { # folder of the run, further overrides
+  local resume=()
+  [ -e "$1/checkpoints/last.ckpt" ] && resume=("ckpt_path=$1/checkpoints/last.ckpt")
+  python train.py data=folder "data.root=$data" features=image_hull_section_consistency encoder.coarse_width=64 \
+    encoder.coarse_channels=64 batches.foreground_share=0.65 batches.memory_mib=16000 "hydra.run.dir=$1" "${resume[@]}" "${@:2}"
+}
+trained "$folder/run" 'splits.train=[train,train_extra,chibi,train,train_extra,chibi,more,more,more,variants,swaps,embedded]' \
+  'augmentation=[stretch,recolor,mirror]' augmentation.recolor.share=0.7 augmentation.stretch.share=0.8 averaging.decay=0.998 \
+  budget.seconds=3960 "$@"
+# a last stretch by what a network sees in the pictures: sharper ones
+trained "$folder/sharp" 'splits.train=[train,train_extra,chibi]' "start_from=$folder/run" loss.perceptual.weight=0.1 \
+  +schedule.phases.0.square=64 scale.learning_rate=5e-4 optimizer.matrix_lr=0.002 budget.seconds=null budget.steps=300 "$@"
 
-charnerf evaluate "$run" --data "$data" --split test -o "$folder/measured" \
+charnerf evaluate "$folder/sharp" --data "$data" --split test -o "$folder/measured" \
   --nearest-from "$data:train" --nearest-from "$data:train_extra" --nearest-from "$data:embedded"
