@@ -1,4 +1,6 @@
-"""Make README.md's picture, those of docs/gallery.md and the examples of the page: `python -m docs.pictures --meshes FOLDER --drawn FOLDER`.
+"""Make README.md's picture, those of docs/gallery.md and the examples of the page.
+
+    python -m docs.pictures --meshes FOLDER --drawn FOLDER
 
 FOLDER/NAME.glb and FOLDER/NAME/VIEW.png are the characters that docs/gallery/pictures.csv names; they stay where they are. Without
 one of the options its picture is left as it is.
