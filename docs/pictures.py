@@ -54,8 +54,8 @@ def main() -> None:
     for kind, place in places.items():
         if place is not None:
             found = [drawings(place, row) for row in rows if row["picture"] == kind]
-            file = FOLDER.parent / "gallery.png" if kind == "readme" else FOLDER / f"{kind}.png"
-            sheet(model, found).quantize(COLORS).save(file, optimize=True)
+            made = FOLDER.parent / "gallery.png" if kind == "readme" else FOLDER / f"{kind}.png"
+            sheet(model, found).quantize(COLORS).save(made, optimize=True)
     write_examples(Path(charnerf.__file__).parent / "app" / "examples")
 
 
