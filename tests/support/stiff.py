@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import torch
+from omegaconf import DictConfig
 from torch import Tensor, nn
 
 from charnerf.config.composition import compose_config
@@ -119,7 +120,7 @@ def fit(
         autocast: Precision of the networks.
         change: Applied to every batch.
     """
-    cfg = compose_config(["scale=smoke", *overrides])
+    cfg = _composed(*overrides).copy()
     cfg.model.box_half_extent *= length
     cfg.model.box_centre = [length * x for x in cfg.model.box_centre]
     if "scale" in cfg.model.activation:
@@ -148,6 +149,11 @@ def fit(
         output = renderer.render(model.scene(model.encode(seen.views, seen.hull), 0), seen.rays[0]).finest
     shown = seen.alpha[0] > 0.5
     return Fit(tuple(history), float(output.opacity[shown].mean()) if bool(shown.any()) else math.nan, model)
+
+
+@cache
+def _composed(*overrides: str) -> DictConfig:
+    return compose_config(["scale=smoke", *overrides])
 
 
 def drawn(character: Character, picture: Callable[[Tensor], Tensor]) -> Character:

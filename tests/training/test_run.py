@@ -23,7 +23,8 @@ from charnerf.training.start import begin
 from support import small_runs
 from support.tags import promised_tags
 
-STEPS = 40
+STEPS = 12
+MARKS = [STEPS // 2, STEPS]  # of validations
 VALUES = ("reconstruction", "surface_rgb", "surface_alpha", "opacity", "depth", "occupancy")  # of the loss
 WEIGHTS = (
     "reconstruction.weight",
@@ -87,7 +88,7 @@ def test_evaluating_the_run_gives_its_own_figures(run_folder, figure_dataset, tm
 def test_the_curve_has_a_row_a_validation(run_folder):
     with (run_folder / "curve.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [int(row["step"]) for row in rows] == [20, 40]
+    assert [int(row["step"]) for row in rows] == MARKS
     assert [float(row["phase"]) for row in rows] == [0.0, 1.0]
     assert [float(row["rays"]) for row in rows] == [16.0, 32.0]
     assert 0 < float(rows[0]["seconds"]) < float(rows[1]["seconds"])
@@ -113,14 +114,14 @@ def test_tensorboards_own_reader_finds_what_the_page_promises(run_folder):
 def test_what_tensorboard_shows_is_true(run_folder):
     events = EventAccumulator(str(run_folder / "tensorboard"), size_guidance={"tensors": 0}).Reload()
     assert [event.value for event in events.Scalars("train/rays")] == [16.0, 32.0]
-    assert [event.step for event in events.Scalars("val/ssim")] == [20, 40]
+    assert [event.step for event in events.Scalars("val/ssim")] == MARKS
     seconds = [event.value for event in events.Scalars("train/seconds")]
     assert seconds == sorted(seconds) and seconds[0] > 0
     shares = [tag for tag in events.Tags()["scalars"] if tag.startswith("attention/")]
     for number in range(2):
         assert sum(events.Scalars(tag)[number].value for tag in shares) == pytest.approx(1.0, abs=1e-5)
     pictures = events.Images("val/target_prediction_error_depth_opacity/0")
-    assert [(one.width, one.height, one.step) for one in pictures] == [(5 * 32, 32, 20), (5 * 32, 32, 40)]
+    assert [(one.width, one.height, one.step) for one in pictures] == [(5 * 32, 32, step) for step in MARKS]
     metrics = json.loads((run_folder / "metrics.json").read_text())
     final = {tag: events.Scalars(f"Final/{tag}")[0].value for tag in ("psnr", "seconds_train")}
     expected = {"psnr": metrics["psnr"], "seconds_train": metrics["seconds"]["train"]}
