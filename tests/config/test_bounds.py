@@ -83,14 +83,14 @@ def test_sizes_that_no_machine_has_are_refused() -> None:
         *("data.views=1000000000", "data.train=1000000000", "scale.eval_views=1000000000"),
         *("renderer.num_coarse=1000000000", "renderer.memory_mib=1000000000000", "head.hidden=1000000000"),
         *("batches.workers=100000", "validation.views=1000000000", "scale.phase_rays=[1000000000,1]"),
-        "seed=1" + "0" * 100,
+        *("seed=1" + "0" * 100, "+schedule.phases.0.square=1000000000"),
     )
     with pytest.raises(ConfigError) as caught:
         compose_config(["scale=smoke", *overrides])
     _, *lines = str(caught.value).splitlines()
-    assert len(lines) == len(overrides)
+    assert len(lines) == len(overrides) + 1  # schedule.phases.0.rays refers to scale.phase_rays
     for override in overrides:
-        key = override.partition("=")[0]
+        key = override.partition("=")[0].removeprefix("+")
         (line,) = (one for one in lines if re.match(rf"  {re.escape(key)}(\.\d)?: ", one))
         assert re.search(r": found .*, expected at most ", line), line
 

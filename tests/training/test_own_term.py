@@ -47,6 +47,6 @@ def test_a_term_from_outside_is_trained_logged_and_weighed_by_phases(figure_data
     assert "train/loss/thin" in events.Tags()["scalars"]
     with (tmp_path / "run/curve.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert list(rows[0])[-2:] == ["occupancy", "thin"]
+    assert list(rows[0])[-2:] == ["perceptual", "thin"]
     assert float(rows[0]["thin"]) > 0.0
     assert rows[1]["thin"] == ""  # of the second phase

@@ -22,7 +22,7 @@ LARGEST: Mapping[str, float] = {  # numbers by name, of whichever section
     **dict.fromkeys(("width", "coarse_width", "fine_width", "attention_width", "hidden"), 8192),
     **dict.fromkeys(("feature_dim", "out_channels", "coarse_channels", "fine_channels", "num_heads"), 8192),
     **dict.fromkeys(("image_size", "size", "num_coarse", "train_num_coarse", "num_fine", "num_guided"), 4096),
-    **dict.fromkeys(("hull_steps", "batch_characters", "num_directions"), 4096),
+    **dict.fromkeys(("hull_steps", "batch_characters", "num_directions", "square"), 4096),
     **dict.fromkeys(("mesh_resolution", "workers"), 1024),
     **dict.fromkeys(("views", "eval_views", "times"), 100_000),
     **dict.fromkeys(("rays", "surface_points", "phase_rays", "phase_surface_points"), 10**7),
